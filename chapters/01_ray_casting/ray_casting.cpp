@@ -1,0 +1,259 @@
+#include "chapters/01_ray_casting/ray_casting.h"
+
+#include <cmath>
+#include <type_traits>
+
+#include "chapters/01_ray_casting/triangle_blocks.h"
+#include "common/error.h"
+#include "common/parallel/bands.h"
+#include "common/parallel/for_each.h"
+
+#if defined(__CUDACC__)
+#include "chapters/01_ray_casting/triangle_tiles.h"
+#endif
+
+namespace trilha {
+
+PinholeCamera PinholeCamera::make(const Camera& camera, int width, int height) {
+  const dvec3 view = dvec3(camera.target) - dvec3(camera.eye);
+  const double distance = glm::length(view);
+  if (!(distance > 0 && std::isfinite(distance)))
+    throw InputError("the camera's eye is at its target; move one of them");
+  if (!(camera.field_of_view > 0 && camera.field_of_view < 180))
+    throw InputError("the camera's field of view is " + std::to_string(camera.field_of_view) +
+                     " degrees; it has to be between 0 and 180");
+  const dvec3 forward = view / distance;
+  const dvec3 right = glm::cross(forward, dvec3(camera.up) / glm::length(dvec3(camera.up)));
+  if (!(glm::length(right) > 1e-6)) throw InputError("the camera's up vector points along its view; turn one of them");
+  const double half_height = std::tan(glm::radians(static_cast<double>(camera.field_of_view)) / 2);
+  const double half_width = half_height * width / height;
+  const dvec3 unit_right = glm::normalize(right);
+  return {camera.eye, vec3(forward), vec3(unit_right * half_width),
+          vec3(glm::cross(forward, unit_right) * half_height)};
+}
+
+// ---- shading --------------------------------------------------------------------------------------------------------
+
+namespace {
+
+/// A colour for every number, far from those of its neighbours: hues by the golden ratio.
+TRILHA_HD vec3 colour_of(std::uint32_t number) {
+  const float hue = static_cast<float>((number + 1u) * 2654435769u >> 8) * 0x1p-24f * 6.0f;
+  const vec3 offset = {hue - 3.0f, hue - 2.0f, hue - 4.0f};
+  const vec3 rgb = {std::fabs(offset.x) - 1.0f, 2.0f - std::fabs(offset.y), 2.0f - std::fabs(offset.z)};
+  const float lightness = (number & 1u) != 0 ? 0.95f : 0.75f;
+  vec3 result;
+  for (int c = 0; c < 3; ++c) result[c] = lightness * (0.25f + 0.75f * min(max(rgb[c], 0.0f), 1.0f));
+  return result;
+}
+
+TRILHA_HD vec3 normalised(const vec3& v) {
+  const float length = std::sqrt(fused_dot(v, v));
+  return length > 0 ? v / length : v;
+}
+
+/// The unit normal of a triangle of any size: its edges are scaled by their largest component first.
+TRILHA_HD vec3 geometric_normal(const vec3& a, const vec3& b, const vec3& c) {
+  const vec3 e1 = b - a, e2 = c - a;
+  float size = 0;
+  for (int k = 0; k < 3; ++k) size = max(size, max(std::fabs(e1[k]), std::fabs(e2[k])));
+  return size > 0 ? normalised(fused_cross(e1 / size, e2 / size)) : vec3(0);
+}
+
+template <class T>
+TRILHA_HD T interpolated(const T* values, const uvec3& triangle, const Hit& hit) {
+  return values[triangle.x] * (1 - hit.u - hit.v) + values[triangle.y] * hit.u + values[triangle.z] * hit.v;
+}
+
+}  // namespace
+
+template <Reads reads>
+TRILHA_HD vec3 Shade<reads>::colour(const Ray& ray, const Hit& hit) const {
+  if (shading == Shading::tests) return vec3(static_cast<float>(tested));
+  if (!hit.found()) return vec3(0);
+  vec3 normal(0), geometric(0);
+  if constexpr (reads != Reads::hit_alone) {
+    const uvec3 t = surface.triangles[hit.primitive];
+    geometric = geometric_normal(surface.positions[t.x], surface.positions[t.y], surface.positions[t.z]);
+    normal = geometric;
+    if (reads == Reads::smooth_normal || (reads == Reads::everything && surface.normals != nullptr)) {
+      normal = normalised(interpolated(surface.normals, t, hit));
+      if (fused_dot(normal, geometric) < 0) normal = -normal;
+    }
+    if (reads == Reads::everything && surface.texture_coordinates != nullptr) {
+      const vec2 uv = interpolated(surface.texture_coordinates, t, hit);
+      if (uv.x != uv.x) return vec3(1, 0, 1);  // keeps the compiler from dropping what this kernel is there to show
+    }
+  }
+  const bool front = fused_dot(geometric, ray.direction) < 0;
+  switch (shading) {
+    case Shading::lambert: {
+      const vec3 diffuse = surface.diffuse[surface.materials != nullptr ? surface.materials[hit.primitive] : 0];
+      return diffuse * std::fabs(fused_dot(normal, ray.direction));
+    }
+    case Shading::normals: return normal * 0.5f + vec3(0.5f);
+    case Shading::depth: {
+      const float depth = (hit.t - depth_near) / (depth_far - depth_near);
+      return vec3(1.0f - 0.9f * min(max(depth, 0.0f), 1.0f));
+    }
+    case Shading::primitive: return colour_of(hit.primitive);
+    case Shading::barycentrics: return {1 - hit.u - hit.v, hit.u, hit.v};
+    case Shading::facing: return front ? vec3(0.2f, 0.45f, 0.7f) : vec3(0.9f, 0.6f, 0.0f);
+    case Shading::tests: break;
+  }
+  return vec3(0);
+}
+
+namespace {
+
+// ---- building -------------------------------------------------------------------------------------------------------
+
+/// All meshes of a scene as one, with only those parts that are asked for.
+struct Parts {
+  bool normals, texture_coordinates, materials;
+};
+Mesh united_mesh(const Scene& scene, const Parts& parts) {
+  Mesh all;
+  all.positions.reserve(scene.vertex_count());
+  all.triangles.reserve(scene.triangle_count());
+  for (const Mesh& mesh : scene.meshes) {
+    const auto offset = static_cast<std::uint32_t>(all.positions.size());
+    all.positions.insert(all.positions.end(), mesh.positions.begin(), mesh.positions.end());
+    for (const uvec3& t : mesh.triangles) all.triangles.push_back(t + offset);
+    if (parts.normals) {
+      Mesh made;
+      if (mesh.normals.empty()) {
+        made = {"", mesh.positions, mesh.triangles, {}, {}, {}};
+        make_normals(made);
+      }
+      const auto& normals = mesh.normals.empty() ? made.normals : mesh.normals;
+      all.normals.insert(all.normals.end(), normals.begin(), normals.end());
+    }
+    if (parts.texture_coordinates) {
+      const auto& uvs = mesh.texture_coordinates;
+      all.texture_coordinates.insert(all.texture_coordinates.end(), uvs.begin(), uvs.end());
+      all.texture_coordinates.resize(all.positions.size(), vec2(0));
+    }
+    if (parts.materials) {
+      all.materials.insert(all.materials.end(), mesh.materials.begin(), mesh.materials.end());
+      all.materials.resize(all.triangles.size(), 0);
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream)
+    : settings_(settings), stream_(stream), bounds_(bounds(scene)) {
+  if (scene.triangle_count() >= no_primitive || scene.vertex_count() >= no_primitive)
+    throw InputError(scene.name + ": more than 2^32 - 2 triangles or vertices; 32-bit numbers name them");
+  count_ = static_cast<std::uint32_t>(scene.triangle_count());
+  if (!settings.specialise) settings_.keep = {true, true, true, true, true};
+  const Keep& keep = settings_.keep;
+  const bool diffuse_needed = keep.materials || settings.shading == Shading::lambert;
+  const Parts parts{reads_normals(settings) || keep.normals, keep.texture_coordinates && scene.features.texture_coordinates,
+                    diffuse_needed && scene.features.materials};
+  const Mesh mesh = united_mesh(scene, parts);
+  positions_ = Buffer(stream_, mesh.positions);
+  triangles_ = Buffer(stream_, mesh.triangles);
+  normals_ = Buffer(stream_, mesh.normals);
+  texture_coordinates_ = Buffer(stream_, mesh.texture_coordinates);
+  materials_ = Buffer(stream_, mesh.materials);
+  if (diffuse_needed) {
+    std::vector<vec3> diffuse;
+    for (const Material& material : scene.materials) diffuse.push_back(material.diffuse);
+    diffuse_ = Buffer(stream_, diffuse);
+  }
+  with_test(settings_.test, [&](auto test) { prepare<decltype(test)>(); });
+  stream_.synchronize();
+  if (!reads_surface(settings_) && !keep.surface && !keep.general_kernel) positions_ = {}, triangles_ = {};
+}
+
+template <class Test>
+void RayCaster::prepare() {
+  if (count_ == 0) return;
+  const bool blocks = stream_.backend() == Backend::cpu && settings_.loop == Loop::blocked;
+  const std::uint32_t lanes = blocks ? block_lanes : 1;
+  const std::size_t padded = (static_cast<std::size_t>(count_) + lanes - 1) / lanes * lanes;
+  numbers_ = Buffer<float>(stream_.backend(), padded * Test::numbers);
+  for_each(stream_, padded,
+           PrepareTriangles<Test>{positions_.data(), triangles_.data(), count_, lanes, numbers_.data()});
+}
+
+// ---- rendering ------------------------------------------------------------------------------------------------------
+
+void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
+  with_test(settings_.test, [&](auto test) {
+    using Primitives = Triangles<decltype(test)>;
+    const Primitives triangles{numbers_.data(), count_, settings_.one_sided};
+    if (settings_.loop == Loop::plain) {
+      for_each(stream_, n, Trace<BruteForce<Primitives>>{{triangles}, 0, rays, hits}, 64);
+    } else if (stream_.backend() == Backend::cpu) {
+      trace_blocks(triangles, rays, hits, n);
+    } else {
+#if defined(__CUDACC__)
+      trace_tiles(stream_, triangles, rays, hits, n);
+#endif
+    }
+  });
+}
+
+bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sample, bool jittered, std::uint64_t seed,
+                           const std::function<bool(double)>& keep_going) {
+  const Tiling& tiling = film.tiling();
+  const PinholeCamera pinhole =
+      PinholeCamera::make(camera, static_cast<int>(tiling.width), static_cast<int>(tiling.height));
+  const std::size_t most_tiles = std::min<std::size_t>(tiling.tiles(), 2048);
+  if (rays_.size() != most_tiles * Tiling::tile_size) {
+    rays_ = {}, hits_ = {};  // freed before the new ones are made
+    rays_ = Buffer<Ray>(stream_.backend(), most_tiles * Tiling::tile_size);
+    hits_ = Buffer<Hit>(stream_.backend(), most_tiles * Tiling::tile_size);
+  }
+  const std::size_t first_tiles = stream_.backend() == Backend::cuda ? 256 : 2;
+  const double target_ms = 100;
+  return for_each_band(
+      stream_, tiling.tiles(), first_tiles, most_tiles, target_ms,
+      [&](std::size_t first_tile, std::size_t end_tile) {
+        const std::size_t begin = first_tile * Tiling::tile_size, end = end_tile * Tiling::tile_size;
+        Timer rays_timer(stream_);
+        for_each(stream_, {begin, end},
+                 PrimaryRays{pinhole, tiling, begin, seed, sample, jittered, rays_.data()});
+        times_.rays += rays_timer.milliseconds();
+        Timer trace_timer(stream_);
+        trace(rays_.data(), hits_.data(), end - begin);
+        times_.trace += trace_timer.milliseconds();
+        tests_ += static_cast<double>(end - begin) * count_;
+        Timer shade_timer(stream_);
+        if (settings_.keep.general_kernel) {
+          shade<Reads::everything>(begin, end, film, camera);
+        } else if (reads_normals(settings_)) {
+          shade<Reads::smooth_normal>(begin, end, film, camera);
+        } else if (reads_surface(settings_)) {
+          shade<Reads::flat_normal>(begin, end, film, camera);
+        } else {
+          shade<Reads::hit_alone>(begin, end, film, camera);
+        }
+        times_.shade += shade_timer.milliseconds();
+      },
+      keep_going);
+}
+
+template <Reads reads>
+void RayCaster::shade(std::size_t begin, std::size_t end, Film& film, const Camera& camera) {
+  const bool smooth = reads_normals(settings_);
+  const SurfaceView surface{positions_.data(),
+                            triangles_.data(),
+                            smooth ? normals_.data() : nullptr,
+                            texture_coordinates_.data(),
+                            materials_.size() > 0 ? materials_.data() : nullptr,
+                            diffuse_.data()};
+  const double radius = glm::length(dvec3(bounds_.upper) - dvec3(bounds_.lower)) / 2;
+  const double distance = glm::length(dvec3(bounds_.centre()) - dvec3(camera.eye));
+  for_each(stream_, {begin, end},
+           Shade<reads>{film.tiling(), begin, rays_.data(), hits_.data(), surface, settings_.shading, count_,
+                        static_cast<float>(std::max(distance - radius, 0.0)), static_cast<float>(distance + radius),
+                        film.pixels()});
+}
+
+}  // namespace trilha

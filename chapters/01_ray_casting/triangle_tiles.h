@@ -1,0 +1,101 @@
+#pragma once
+// Brute force in the loop order of a GPU: a block of threads, some rays each, brings a tile of triangles into shared
+// memory together, then every thread tests its rays against the tile. All threads of a warp read the same triangle at
+// the same time, which shared memory serves in one go. The result is that of BruteForce, bit for bit.
+
+#include <type_traits>
+
+#include "chapters/01_ray_casting/ray_casting.h"
+#include "cuda/check.h"
+
+namespace trilha {
+
+constexpr int tile_threads = 128;
+constexpr int tile_triangles = 128;
+constexpr int rays_a_thread = 2;  // two rays share what is read of a triangle, and hide each other's latency
+
+/// One triangle in shared memory: three 16-byte reads, whatever the test keeps.
+struct alignas(16) TileSlot {
+  float numbers[12];
+};
+
+/// Tests a thread's rays against the tile. In a turned tile coordinates lie in the order that all the rays want.
+template <bool turned, class Test, class Constants>
+__device__ inline void test_tile(const Triangles<Test>& triangles, const TileSlot* tile, std::uint32_t begin,
+                                 std::uint32_t count, const Ray* ray, const Constants* constants, Hit* hit) {
+  for (std::uint32_t j = 0; j < count; ++j) {
+    const float* s = tile[j].numbers;
+    for (int r = 0; r < rays_a_thread; ++r) {
+      const auto measure = [&] {
+        if constexpr (turned) {
+          return Test::measure_turned(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], constants[r]);
+        } else {
+          return Test::measure(Numbers<float>{s}, ray[r], constants[r]);
+        }
+      }();
+      if (Test::may_hit(measure)) triangles.settle(measure, begin + j, ray[r], constants[r], hit[r]);
+    }
+  }
+}
+
+template <class Test>
+__global__ void __launch_bounds__(tile_threads)
+    trace_tiles_kernel(const Triangles<Test> triangles, const Ray* rays, Hit* hits, std::size_t n) {
+  constexpr bool watertight = std::is_same_v<Test, Watertight>;
+  __shared__ TileSlot tile[tile_triangles];
+
+  Ray ray[rays_a_thread];
+  decltype(Test::constants(Ray{})) constants[rays_a_thread];
+  Hit hit[rays_a_thread];
+  const std::size_t first = static_cast<std::size_t>(blockIdx.x) * tile_threads * rays_a_thread + threadIdx.x;
+  for (int r = 0; r < rays_a_thread; ++r) {
+    const std::size_t i = first + r * tile_threads;
+    ray[r] = rays[i < n ? i : n - 1];
+    constants[r] = Test::constants(ray[r]);
+    hit[r].t = ray[r].t_max;
+  }
+
+  // The watertight test reads coordinates in an order that depends on the ray. Where all rays of the block want the
+  // same order, which neighbours nearly always do, the triangles are turned once, on their way into the tile.
+  int turn = -1;
+  if constexpr (watertight) {
+    __shared__ int wanted;
+    if (threadIdx.x == 0) wanted = constants[0].kz;
+    __syncthreads();
+    bool agreed = true;
+    for (int r = 0; r < rays_a_thread; ++r) agreed = agreed && constants[r].kz == wanted;
+    if (__syncthreads_and(agreed)) turn = wanted;
+  }
+
+  for (std::uint32_t begin = 0; begin < triangles.count; begin += tile_triangles) {
+    const std::uint32_t count = min(triangles.count - begin, static_cast<std::uint32_t>(tile_triangles));
+    __syncthreads();
+    for (std::uint32_t k = threadIdx.x; k < count * Test::numbers; k += tile_threads) {
+      const std::uint32_t triangle = k / Test::numbers, number = k % Test::numbers;
+      std::uint32_t place = number;
+      if (turn >= 0) place = number / 3 * 3 + (number % 3 + 2 - turn) % 3;  // axis `turn` becomes the third
+      tile[triangle].numbers[place] = triangles.numbers[static_cast<std::size_t>(begin) * Test::numbers + k];
+    }
+    __syncthreads();
+    if (watertight && turn >= 0) {
+      test_tile<watertight>(triangles, tile, begin, count, ray, constants, hit);
+    } else {
+      test_tile<false>(triangles, tile, begin, count, ray, constants, hit);
+    }
+  }
+  for (int r = 0; r < rays_a_thread; ++r)
+    if (const std::size_t i = first + r * tile_threads; i < n) hits[i] = hit[r];
+}
+
+/// The nearest hit of each of n rays; all arrays lie on the device.
+template <class Test>
+void trace_tiles(const Stream& stream, const Triangles<Test>& triangles, const Ray* rays, Hit* hits, std::size_t n) {
+  if (n == 0) return;
+  constexpr std::size_t rays_a_block = tile_threads * rays_a_thread;
+  const auto blocks = static_cast<unsigned>((n + rays_a_block - 1) / rays_a_block);
+  trace_tiles_kernel<<<blocks, tile_threads, 0, static_cast<cudaStream_t>(stream.native())>>>(triangles, rays, hits,
+                                                                                              n);
+  cuda::check(cudaGetLastError(), "trace_tiles_kernel");
+}
+
+}  // namespace trilha

@@ -1,0 +1,72 @@
+#pragma once
+// What a chapter gives to the program around it, and all that the program knows of a chapter.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/app/settings.h"
+#include "common/image/film.h"
+#include "common/parallel/backend.h"
+#include "common/scene/scene.h"
+
+namespace trilha {
+
+/// Something that the scene or the settings make unnecessary, and so was not built, uploaded or compiled in.
+struct Omission {
+  std::string what;
+  std::string why;
+  /// The stages whose time it can change: "build" or names from Demo::stage_times.
+  std::vector<std::string> stages;
+  /// Builds and renders it after all (true), or leaves it out again, so that what it saves can be measured.
+  std::function<void(bool keep)> keep;
+};
+
+/// One sample a pixel, to be added to a film.
+struct SampleRequest {
+  const Camera& camera;
+  std::uint32_t index;  ///< 0, 1, …
+  bool jittered;        ///< anywhere in the pixel, or through its centre
+  std::uint64_t seed;
+  /// Asked now and then with the fraction done; false means stop.
+  std::function<bool(double)> keep_going;
+};
+
+class Demo {
+ public:
+  virtual ~Demo() = default;
+
+  /// The program's name ("01_ray_casting") and title ("Ray casting").
+  virtual std::pair<std::string, std::string> name() const = 0;
+
+  virtual void declare_settings(Settings& settings) = 0;
+
+  /// Builds all that the settings need, on the stream's backend; replaces what was built before. The scene stays alive
+  /// and unchanged until the next build.
+  virtual void build(const Scene& scene, const Stream& stream) = 0;
+
+  /// Adds a sample to every pixel of the film. Returns false if told to stop; what was done stays in the film.
+  virtual bool add_sample(Film& film, const SampleRequest& request) = 0;
+
+  /// The film as an image: its encoding, and colours in place of counts where a heat map was asked for.
+  virtual Image develop(const Film& film, const Stream& stream) const { return film.image(stream); }
+
+  /// Names that --heatmap takes, and the choice of one.
+  virtual std::vector<std::string> heatmaps() const { return {}; }
+  virtual void show_heatmap(const std::string& /*measure*/) {}
+
+  /// Milliseconds by stage of all samples since the build; what the sum leaves of the whole is overhead.
+  virtual std::vector<std::pair<std::string, double>> stage_times() const { return {}; }
+  /// Rays traced since the build.
+  virtual double rays() const = 0;
+
+  /// What the last build left out.
+  virtual std::vector<Omission> omissions() { return {}; }
+};
+
+/// The main function of every chapter's program.
+int run_program(int argc, char** argv, std::unique_ptr<Demo> demo);
+
+}  // namespace trilha

@@ -1,0 +1,285 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <new>
+#include <nlohmann/json.hpp>
+
+#include "common/app/command_line.h"
+#include "common/app/demo.h"
+#include "common/app/progress.h"
+#include "common/error.h"
+#include "common/scene/library.h"
+
+namespace trilha {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+void warn(const std::string& text) { std::cerr << "warning: " << text << "\n"; }
+
+/// What one run did.
+struct Outcome {
+  double build_ms = 0, render_ms = 0, rays = 0;
+  std::size_t bytes = 0;  ///< that the buffers of the backend held at most
+  int samples = 0;        ///< complete ones
+  bool stopped = false;
+  std::vector<std::pair<std::string, double>> stage_ms;
+
+  double mrays_per_s() const { return render_ms > 0 ? rays / render_ms / 1e3 : 0; }
+};
+
+/// An omission with what it saved: differences of two measured runs, kept and left out taking turns.
+struct Saving {
+  Omission omission;
+  std::optional<double> bytes, ms;
+};
+
+Backend choose_backend(const Options& options) {
+  const Backend backend = options.backend.value_or(Backend::cuda);
+  const std::string reason = why_unavailable(backend);
+  if (reason.empty()) return backend;
+  if (options.backend) throw DeviceError("--backend cuda: " + reason + "; use --backend cpu");
+  return Backend::cpu;
+}
+
+Scene load(const Options& options) {
+  Scene scene = load_scene(options.scene);
+  if (options.eye) scene.camera.eye = *options.eye;
+  if (options.target) scene.camera.target = *options.target;
+  if (options.up) scene.camera.up = *options.up;
+  if (options.field_of_view) scene.camera.field_of_view = *options.field_of_view;
+  return scene;
+}
+
+Outcome build(Demo& demo, const Scene& scene, const Stream& stream) {
+  Outcome outcome;
+  const auto start = Clock::now();
+  demo.build(scene, stream);
+  stream.synchronize();
+  outcome.build_ms = milliseconds_since(start);
+  return outcome;
+}
+
+void render(Demo& demo, const Scene& scene, const Stream& stream, const Options& options, Film& film,
+            Outcome& outcome) {
+  const bool timed = options.seconds > 0;
+  const int most = timed ? 1 << 24 : options.samples;
+  Progress progress("rendering", timed ? options.seconds : most, options.quiet || options.json);
+  if (timed) progress.stop_after(options.seconds);
+  const auto start = Clock::now();
+  double shown = 0;
+  for (; outcome.samples < most && !outcome.stopped; ++outcome.samples) {
+    const auto keep_going = [&](double fraction) {
+      const double done = timed ? progress.seconds() : outcome.samples + fraction;
+      progress.advance(done - shown);
+      shown = done;
+      return !progress.cancelled();
+    };
+    const bool jittered = timed || most > 1;
+    const bool finished = demo.add_sample(
+        film, {scene.camera, static_cast<std::uint32_t>(outcome.samples), jittered, options.seed, keep_going});
+    outcome.stopped = !finished;
+    if (!finished) break;
+    if (progress.cancelled()) {
+      ++outcome.samples;
+      outcome.stopped = outcome.samples < most;
+      break;
+    }
+  }
+  stream.synchronize();
+  outcome.render_ms = milliseconds_since(start);
+  outcome.rays = demo.rays();
+  outcome.stage_ms = demo.stage_times();
+  outcome.bytes = peak_bytes(stream.backend());
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+}
+
+/// Measures each omission on an image small enough to take a tenth of a second: five turns of kept and left out.
+std::vector<Saving> measure(Demo& demo, const Scene& scene, const Stream& stream, Options options,
+                            const Outcome& outcome) {
+  const double affordable = std::max(1024.0, 1e5 * outcome.mrays_per_s());
+  const double scale = std::min(1.0, std::sqrt(affordable / (double(options.width) * options.height)));
+  options.width = std::max(1, static_cast<int>(options.width * scale));
+  options.height = std::max(1, static_cast<int>(options.height * scale));
+  options.samples = 1;
+  options.seconds = 0;
+  options.quiet = true;
+  std::vector<Saving> savings;
+  for (Omission& omission : demo.omissions()) {
+    std::vector<double> ms[2];
+    double bytes[2] = {};
+    for (int turn = 0; turn < 6 && !interrupted(); ++turn)
+      for (const bool kept : {true, false}) {
+        omission.keep(kept);
+        Film film(stream, options.width, options.height);
+        const std::size_t before = live_bytes(stream.backend());
+        Outcome run = build(demo, scene, stream);
+        render(demo, scene, stream, options, film, run);
+        bytes[kept] = static_cast<double>(live_bytes(stream.backend())) - static_cast<double>(before);
+        if (turn == 0) continue;  // the warm-up
+        double total = 0;
+        for (const std::string& stage : omission.stages) {
+          if (stage == "build") total += run.build_ms;
+          for (const auto& [name, time] : run.stage_ms) total += name == stage ? time : 0;
+        }
+        ms[kept].push_back(total);
+      }
+    if (ms[0].size() < 5 || ms[1].size() < 5) break;  // interrupted
+    savings.push_back({omission, bytes[true] - bytes[false], median(ms[true]) - median(ms[false])});
+  }
+  return savings;
+}
+
+std::string with_unit(double bytes) {
+  char text[32];
+  const double size = std::fabs(bytes);
+  if (size < 1e4) std::snprintf(text, sizeof text, "%.0f B", bytes);
+  else if (size < 1e7) std::snprintf(text, sizeof text, "%.1f kB", bytes / 1e3);
+  else std::snprintf(text, sizeof text, "%.1f MB", bytes / 1e6);
+  return text;
+}
+
+void print_text(const Demo& demo, const Scene& scene, const Stream& stream, const Options& options,
+                const Outcome& outcome, const std::vector<Saving>& savings) {
+  const auto line = [](const char* what) -> std::ostream& {
+    std::cout << what << std::string(12 - std::string(what).size(), ' ');
+    return std::cout;
+  };
+  const auto number = [](double x, int digits) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.*f", digits, x);
+    return std::string(text);
+  };
+  line("image") << options.output << ", " << options.width << "x" << options.height << ", " << outcome.samples
+                << (outcome.samples == 1 ? " sample" : " samples") << " a pixel"
+                << (outcome.stopped ? " (stopped before its end)" : "") << "\n";
+  line("scene") << scene.name << ", " << scene.triangle_count() << " triangles\n";
+  line("machine") << device_name(stream.backend()) << "\n";
+  line("build") << number(outcome.build_ms, 2) << " ms\n";
+  line("render") << number(outcome.render_ms, 1) << " ms";
+  for (std::size_t i = 0; i < outcome.stage_ms.size(); ++i)
+    std::cout << (i == 0 ? " (" : ", ") << outcome.stage_ms[i].first << " " << number(outcome.stage_ms[i].second, 1);
+  std::cout << (outcome.stage_ms.empty() ? "" : ")") << ", " << number(outcome.mrays_per_s(), 3) << " Mrays/s\n";
+  line("memory") << with_unit(static_cast<double>(outcome.bytes)) << " at most\n";
+  for (std::size_t i = 0; i < savings.size(); ++i) {
+    const Saving& s = savings[i];
+    line(i == 0 ? "left out" : "") << s.omission.what;
+    if (s.ms) std::cout << ": " << s.omission.why << "; saved " << with_unit(*s.bytes) << ", " << number(*s.ms, 3) << " ms";
+    std::cout << "\n";
+  }
+  if (!options.explain && !savings.empty()) line("") << "(--explain says why, and measures what it saved)\n";
+  (void)demo;
+}
+
+void print_json(const Demo& demo, const Settings& settings, const Scene& scene, const Stream& stream,
+                const Options& options, const Outcome& outcome, const std::vector<Saving>& savings) {
+  Json left_out = Json::array();
+  for (const Saving& s : savings)
+    left_out.push_back({{"what", s.omission.what},
+                        {"why", s.omission.why},
+                        {"saved_bytes", s.bytes ? Json(*s.bytes) : Json()},
+                        {"saved_ms", s.ms ? Json(*s.ms) : Json()}});
+  Json values = Json::object();
+  for (const Setting& setting : settings.all()) {
+    if (setting.kind == Setting::Kind::flag) values[setting.name] = setting.get() != 0;
+    else if (setting.kind == Setting::Kind::choice) values[setting.name] = setting.text();
+    else values[setting.name] = setting.get();
+  }
+  Json stages = Json::object();
+  for (const auto& [name, ms] : outcome.stage_ms) stages[name] = ms;
+  const Json all = {{"chapter", demo.name().first},
+                    {"scene", scene.name},
+                    {"triangles", scene.triangle_count()},
+                    {"backend", name(stream.backend())},
+                    {"device", device_name(stream.backend())},
+                    {"output", options.output},
+                    {"width", options.width},
+                    {"height", options.height},
+                    {"samples", outcome.samples},
+                    {"stopped", outcome.stopped},
+                    {"build_ms", outcome.build_ms},
+                    {"render_ms", outcome.render_ms},
+                    {"stage_ms", stages},
+                    {"mrays_per_s", outcome.mrays_per_s()},
+                    {"bytes", outcome.bytes},
+                    {"features", scene.features.names()},
+                    {"left_out", left_out},
+                    {"settings", values}};
+  std::cout << all.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+}
+
+void print_scenes() {
+  for (const SceneEntry& entry : scene_table())
+    std::cout << entry.name << std::string(std::max<int>(1, 12 - static_cast<int>(entry.name.size())), ' ')
+              << entry.what << (entry.available ? "" : " (not here: ./trilha assets " + entry.name + ")") << "\n";
+}
+
+int run(int argc, char** argv, Demo& demo) {
+  Options options;
+  Settings settings;
+  demo.declare_settings(settings);
+  if (const auto done = read_command_line(argc, argv, demo, settings, options)) return *done;
+  if (options.list_scenes) {
+    print_scenes();
+    return 0;
+  }
+  set_thread_count(options.threads);
+  check_can_write(options.output);
+  const Stream stream = choose_backend(options);
+  const Scene scene = load(options);
+  for (const std::string& warning : scene.warnings) warn(warning);
+
+  catch_interrupts();
+  Outcome outcome = build(demo, scene, stream);
+  std::vector<Saving> savings;
+  for (const Omission& omission : demo.omissions()) savings.push_back({omission, {}, {}});
+  {
+    Film film(stream, options.width, options.height);
+    render(demo, scene, stream, options, film, outcome);
+    write_image(options.output, demo.develop(film, stream));
+  }
+  if (options.explain) savings = measure(demo, scene, stream, options, outcome);
+  if (options.json) print_json(demo, settings, scene, stream, options, outcome, savings);
+  else if (!options.quiet) print_text(demo, scene, stream, options, outcome, savings);
+  if (outcome.stopped && interrupted()) warn("stopped by request: the image holds what was done by then");
+  std::cout.flush();
+  if (!std::cout) throw InputError("standard output: cannot be written; is there room for it?");
+  return 0;
+}
+
+}  // namespace
+
+int run_program(int argc, char** argv, std::unique_ptr<Demo> demo) {
+  const auto fail = [&](const std::string& text, int code) {
+    std::cerr << "error: " << text << "\n";
+    return code;
+  };
+  try {
+    return run(argc, argv, *demo);
+  } catch (const InputError& error) {
+    return fail(error.what(), 1);
+  } catch (const UsageError& error) {
+    return fail(error.what(), 2);
+  } catch (const DeviceError& error) {
+    return fail(error.what(), 3);
+  } catch (const std::bad_alloc&) {
+    return fail("not enough memory; a smaller --size or scene needs less", 1);
+  } catch (const std::exception& error) {
+    return fail(std::string("in the program itself: ") + error.what(), 70);
+  }
+}
+
+}  // namespace trilha

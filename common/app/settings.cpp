@@ -1,0 +1,82 @@
+#include "common/app/settings.h"
+
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+
+#include "common/error.h"
+
+namespace trilha {
+namespace {
+
+std::string number_text(double x) {
+  char text[32];
+  const auto result = std::to_chars(text, text + sizeof text, static_cast<float>(x));
+  return {text, result.ptr};
+}
+
+}  // namespace
+
+std::string Setting::text() const {
+  const double x = get();
+  if (kind == Kind::flag) return x != 0 ? "true" : "false";
+  if (kind != Kind::choice) return number_text(x);
+  for (const Choice& choice : choices)
+    if (choice.value == x) return choice.name;
+  throw std::logic_error(name + " holds a value that is none of its choices");
+}
+
+void Setting::set_text(const std::string& text) const {
+  const std::string refused = "--" + name + ": '" + text + "' ";
+  if (kind == Kind::flag) {
+    if (text != "true" && text != "false") throw UsageError(refused + "is neither true nor false");
+    return put(text == "true");
+  }
+  if (kind == Kind::choice) {
+    std::string names;
+    for (const Choice& choice : choices) {
+      if (choice.name == text) return put(choice.value);
+      names += (names.empty() ? "" : ", ") + choice.name;
+    }
+    throw UsageError(refused + "is none of its values; choose one of " + names);
+  }
+  double x = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);
+  if (error != std::errc() || end != text.data() + text.size()) throw UsageError(refused + "is no number");
+  if (kind == Kind::integer && x != std::floor(x)) throw UsageError(refused + "is no whole number");
+  if (!(x >= low && x <= high))
+    throw InputError(refused + "is out of range; it goes from " + number_text(low) + " to " + number_text(high));
+  put(x);
+}
+
+void Settings::flag(const std::string& name, bool& value, Effect effect, const std::string& help) {
+  add({name, help, Setting::Kind::flag, effect, 0, 1, {}, [&value] { return value; },
+       [&value](double x) { value = x != 0; }});
+}
+
+void Settings::integer(const std::string& name, int& value, int low, int high, Effect effect,
+                       const std::string& help) {
+  add({name, help, Setting::Kind::integer, effect, double(low), double(high), {}, [&value] { return value; },
+       [&value](double x) { value = static_cast<int>(x); }});
+}
+
+void Settings::number(const std::string& name, float& value, float low, float high, Effect effect,
+                      const std::string& help) {
+  add({name, help, Setting::Kind::number, effect, low, high, {}, [&value] { return value; },
+       [&value](double x) { value = static_cast<float>(x); }});
+}
+
+const Setting& Settings::operator[](const std::string& name) const {
+  for (const Setting& setting : settings_)
+    if (setting.name == name) return setting;
+  throw std::out_of_range("no setting is called " + name);
+}
+
+void Settings::add(Setting setting) {
+  for (const Setting& other : settings_)
+    if (other.name == setting.name) throw std::logic_error("two settings are called " + setting.name);
+  setting.initial = setting.get();
+  settings_.push_back(std::move(setting));
+}
+
+}  // namespace trilha

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/math/box.h"
+#include "common/math/vector.h"
+
+namespace trilha {
+
+/// Triangles that share vertices. What a file does not give, or the scene does not need, stays an empty vector.
+struct Mesh {
+  std::string name;
+  std::vector<vec3> positions;           ///< one a vertex
+  std::vector<uvec3> triangles;          ///< three vertex numbers a triangle, counter-clockwise seen from the front
+  std::vector<vec3> normals;             ///< empty, or one a vertex, of length one
+  std::vector<vec2> texture_coordinates; ///< empty, or one a vertex
+  std::vector<std::uint32_t> materials;  ///< empty (all triangles have material 0), or one a triangle
+};
+
+Box bounds(const Mesh& mesh);
+
+/// Gives the mesh a normal a vertex: the mean of its triangles' normals, weighted by their angles there
+/// (Thürmer & Wüthrich 1998). A vertex of zero-area triangles alone gets (0, 0, 1).
+void make_normals(Mesh& mesh);
+
+}  // namespace trilha

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "common/math/vector.h"
+
+namespace trilha {
+
+/// Splits a polygon of n ≥ 3 corners, which should lie in a plane and may be concave, into n − 2 triangles of
+/// corner numbers that turn as it does. Four corners take the shorter diagonal that lies inside; more are
+/// clipped ear by ear (Meisters 1975), in O(n²) for all but contrived ones. False where the polygon has no
+/// area or crosses itself: the triangles then still use every corner, but overlap.
+bool split_polygon(const std::vector<vec3>& corners, std::vector<uvec3>& triangles);
+
+}  // namespace trilha

@@ -1,0 +1,25 @@
+#define CATCH_CONFIG_RUNNER
+#include "tests/testing.h"
+
+#include <cstdio>
+#include <cstdlib>
+
+namespace trilha::testing {
+
+void require_cuda() {
+  const std::string reason = why_unavailable(Backend::cuda);
+  if (reason.empty()) return;
+  std::printf("TRILHA SKIPPED: %s\n", reason.c_str());  // ctest looks for these words
+  std::fflush(stdout);
+  std::exit(EXIT_SUCCESS);  // each test case is a process of its own under ctest
+}
+
+std::vector<Backend> backends() {
+  std::vector<Backend> result{Backend::cpu};
+  if (why_unavailable(Backend::cuda).empty()) result.push_back(Backend::cuda);
+  return result;
+}
+
+}  // namespace trilha::testing
+
+int main(int argc, char** argv) { return Catch::Session().run(argc, argv); }

@@ -1,0 +1,24 @@
+#pragma once
+// What every test file includes: Catch2, of either generation, and what tests share.
+
+#if __has_include(<catch2/catch_all.hpp>)
+#include <catch2/catch_all.hpp>
+#else
+#include <catch2/catch.hpp>
+#endif
+
+#include <string>
+#include <vector>
+
+#include "common/parallel/backend.h"
+
+namespace trilha::testing {
+
+/// Ends the test case as skipped, never as passed, where there is no CUDA device.
+void require_cuda();
+
+/// The backends that exist here: for checks that hold on each machine. Skips nothing: a case about CUDA alone calls
+/// require_cuda.
+std::vector<Backend> backends();
+
+}  // namespace trilha::testing
