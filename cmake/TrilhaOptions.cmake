@@ -58,8 +58,8 @@ if(TRILHA_HAS_CUDA)
     set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
   endif()
   set(CMAKE_CUDA_FLAGS_RELEASE "-O3 -DNDEBUG")
-  # 20012: GLM's defaulted functions; -lineinfo names source lines in profilers and costs nothing
-  set(TRILHA_CUDA_FLAGS -fmad=false -lineinfo --expt-relaxed-constexpr -diag-suppress=20012)
+  # 20012: GLM's defaulted functions; 20208: long double, in references on the CPU; -lineinfo names source lines in profilers and costs nothing
+  set(TRILHA_CUDA_FLAGS -fmad=false -lineinfo --expt-relaxed-constexpr -diag-suppress=20012,20208)
   find_package(CUDAToolkit REQUIRED)
 endif()
 string(REPLACE ";" "," host_flags "${TRILHA_CXX_FLAGS}")

@@ -96,7 +96,7 @@ struct PlaneBarycentric : KeepsVertices {
   template <class T>
   TRILHA_HD static bool solve(const Measure<T>& m, const RayOf<T>&, NoRayConstants, Solution<T>& s) {
     s = {m.t, m.u / m.det, m.v / m.det, m.n_dot_d < 0};
-    return may_hit(m) && m.det > 0;
+    return may_hit(m) && m.det > 0 && m.det <= std::numeric_limits<T>::max();
   }
 };
 
@@ -133,7 +133,7 @@ struct MollerTrumbore : KeepsVertices {
   TRILHA_HD static bool solve(const Measure<T>& m, const RayOf<T>&, NoRayConstants, Solution<T>& s) {
     const T size = std::fabs(m.det);
     s = {m.t / size, m.u / size, m.v / size, m.det > 0};
-    return may_hit(m) && size > 0;
+    return may_hit(m) && size > 0 && size <= std::numeric_limits<T>::max();
   }
 };
 

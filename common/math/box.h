@@ -21,6 +21,9 @@ TRILHA_HD inline Box united(const Box& a, const vec3& p) {
           {max(a.upper.x, p.x), max(a.upper.y, p.y), max(a.upper.z, p.z)}};
 }
 
-TRILHA_HD inline Box united(const Box& a, const Box& b) { return united(united(a, b.lower), b.upper); }
+TRILHA_HD inline Box united(const Box& a, const Box& b) {
+  return {{min(a.lower.x, b.lower.x), min(a.lower.y, b.lower.y), min(a.lower.z, b.lower.z)},
+          {max(a.upper.x, b.upper.x), max(a.upper.y, b.upper.y), max(a.upper.z, b.upper.z)}};
+}
 
 }  // namespace trilha

@@ -38,8 +38,9 @@ std::size_t checked_numbers(Statements& statements, const std::string& path) {
   std::size_t count = 0;
   for (std::string_view word = statements.word(); !word.empty(); word = statements.word(), ++count) {
     const double value = parse_number(word, path, statements.line());
-    if (value == 0 && word.find_first_of("eE") != word.npos)
+    if (value == 0 && word.find_first_of("eE") != word.npos) {
       statements.replace_word(word[0] == '-' ? "-0" : "0");
+    }
   }
   return count;
 }
@@ -292,7 +293,10 @@ class Parse {
     callback.object_cb = [](void* p, const char* name) { self(p).enter(trimmed(name), ""); };
     callback.group_cb = [](void* p, const char** names, int n) {
       std::string group;
-      for (int i = 0; i < n; ++i) group += (i == 0 ? "" : " ") + std::string(names[i]);
+      for (int i = 0; i < n; ++i) {
+        if (i > 0) group += ' ';
+        group += names[i];
+      }
       self(p).enter(self(p).object_, group);
     };
     TextBuffer buffer(text);

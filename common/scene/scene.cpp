@@ -69,7 +69,7 @@ std::size_t Scene::vertex_count() const {
 Box bounds(const Scene& scene) {
   Box box;
   for (const Mesh& mesh : scene.meshes) {
-    if (!mesh.positions.empty()) box = united(box, bounds(mesh));  // an empty box has infinite corners
+    box = united(box, bounds(mesh));
   }
   return box;
 }

@@ -38,11 +38,14 @@ void refuse(const std::string& path, std::size_t line, const std::string& what) 
 
 std::string in_quotes(std::string_view text) {
   constexpr std::size_t longest = 40;
-  if (text.size() <= longest) return "'" + printable(text) + "'";
-  std::size_t length = longest;
-  while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xc0) == 0x80)
-    --length;  // not amid a letter
-  return "'" + printable(text.substr(0, length)) + "…'";
+  std::size_t length = std::min(text.size(), longest);
+  if (length < text.size()) {  // not amid a letter
+    while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xc0) == 0x80) --length;
+  }
+  std::string result = "'";
+  result += printable(text.substr(0, length));
+  result += length < text.size() ? "…'" : "'";
+  return result;
 }
 
 std::string read_text(const std::string& path) {

@@ -1,0 +1,585 @@
+#include <bit>
+#include <cstring>
+#include <random>
+
+#include "chapters/01_ray_casting/error_bounds.h"
+#include "chapters/01_ray_casting/ray_casting.h"
+#include "chapters/01_ray_casting/triangle_blocks.h"
+#include "common/scene/extreme.h"
+#include "tests/stability/watertight.h"
+#include "tests/testing.h"
+
+using namespace trilha;
+using namespace trilha::testing;
+
+namespace {
+
+template <class Function>
+void with_every_test(const Function& function) {
+  for (const TriangleTest test :
+       {TriangleTest::plane, TriangleTest::moller_trumbore, TriangleTest::baldwin_weber, TriangleTest::watertight})
+    with_test(test, function);
+}
+
+template <class Test>
+const char* name_of() {
+  if (std::is_same_v<Test, PlaneBarycentric>) return "plane";
+  if (std::is_same_v<Test, MollerTrumbore>) return "moller-trumbore";
+  if (std::is_same_v<Test, BaldwinWeber>) return "baldwin-weber";
+  return "watertight";
+}
+
+/// How many pairs or rays a check makes: what CI affords, times TRILHA_EFFORT where more is wanted.
+std::size_t effort(std::size_t n) {
+  const char* factor = std::getenv("TRILHA_EFFORT");
+  return factor ? n * std::strtoull(factor, nullptr, 10) : n;
+}
+
+vec3 in_cube(Random& random) {
+  const float x = random.uniform(-1, 1), y = random.uniform(-1, 1);
+  return {x, y, random.uniform(-1, 1)};
+}
+
+/// A triangle and a ray that often meet; `kind` chooses how hard they make it. Only sums, products and square roots:
+/// the same bits on every machine.
+struct Pair {
+  vec3 a, b, c;
+  Ray ray;
+};
+constexpr int pair_kinds = 12;
+TRILHA_HD Pair make_pair(Random& random, int kind) {
+  const auto cube = [&] {
+    const float x = random.uniform(-1, 1), y = random.uniform(-1, 1);
+    return vec3(x, y, random.uniform(-1, 1));
+  };
+  Pair p{cube(), cube(), cube(), {}};
+  float u = random.uniform(), v = random.uniform();
+  if (u + v > 1) u = 1 - u, v = 1 - v;
+  if (kind == 1) p.c = p.a + (p.b - p.a) * random.uniform() + cube() * 1e-7f;  // a sliver, 1e7 times as long as wide
+  if (kind == 2) u = 0;                                                       // at an edge
+  if (kind == 3) u = v = 0;                                                   // at a vertex
+  vec3 aim = p.a * (1 - u - v) + p.b * u + p.c * v;
+  p.ray.origin = cube() * 3.0f;
+  if (kind == 4) p.ray.origin = aim;                                          // starts on the surface
+  p.ray.direction = aim - p.ray.origin;
+  if (kind == 4) p.ray.direction = cube();
+  if (kind == 5) p.ray.direction = p.b - p.a;                                 // parallel to an edge, grazing
+  if (kind == 6) {                                                            // along an axis
+    const auto axis = static_cast<int>(random.index(3));
+    p.ray.direction = vec3(0);
+    p.ray.direction[axis] = random.uniform() < 0.5f ? -1.0f : 1.0f;
+    p.ray.origin = aim - p.ray.direction * 2.0f;
+  }
+  if (kind == 7) p.b = p.a;                                                   // no area
+  float scale = 1;
+  if (kind == 8) scale = 0x1p-60f;                                            // 1e-18
+  if (kind == 9) scale = 0x1p60f;                                             // 1e18
+  p.a *= scale, p.b *= scale, p.c *= scale, p.ray.origin *= scale;
+  if (kind == 10) {                                                           // 1e5 sizes from the origin
+    const vec3 far = {66319.0f, 551.0f, -74843.0f};
+    p.a += far, p.b += far, p.c += far, p.ray.origin += far;
+  }
+  if (kind == 11) {                                                           // components NaN, infinite, −0, subnormal
+    const float odd[5] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -0.0f,
+                          1e-42f, 3e38f};
+    const float value = odd[random.index(5)];
+    vec3* vectors[5] = {&p.a, &p.b, &p.c, &p.ray.origin, &p.ray.direction};
+    vec3& victim = *vectors[random.index(5)];
+    victim[static_cast<int>(random.index(3))] = value;
+  }
+  return p;
+}
+
+struct PairResult {
+  std::uint32_t hit, front;
+  float t, u, v;
+  bool operator==(const PairResult& o) const { return std::memcmp(this, &o, sizeof o) == 0; }
+};
+
+template <class Test>
+struct TestPairs {
+  std::uint64_t seed, first;
+  PairResult* out;
+
+  TRILHA_HD void operator()(std::size_t i) const {
+    Random random(seed, first + i);
+    const Pair p = make_pair(random, static_cast<int>(i % pair_kinds));
+    Solution<float> s{};
+    const bool hit = intersect<Test>(p.a, p.b, p.c, p.ray, s);
+    out[i] = hit ? PairResult{1, s.front, s.t, s.u, s.v} : PairResult{};
+  }
+};
+
+/// A scene of one mesh.
+Scene scene_of(Mesh mesh) {
+  Scene scene;
+  scene.name = "test";
+  scene.meshes.push_back(std::move(mesh));
+  scene.materials.push_back({});
+  scene.camera = framing(bounds(scene), {0, 1, 0});
+  scene.features = features_of(scene);
+  return scene;
+}
+
+/// Random triangles, some of them hostile.
+Mesh soup(std::uint32_t count, std::uint64_t seed, bool hostile) {
+  Mesh mesh;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Random random(seed, i);
+    const Pair p = make_pair(random, hostile ? static_cast<int>(random.index(pair_kinds)) : 0);
+    for (const vec3& vertex : {p.a, p.b, p.c}) mesh.positions.push_back(vertex);
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  return mesh;
+}
+
+std::vector<Ray> random_rays(std::size_t n, std::uint64_t seed) {
+  std::vector<Ray> rays(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    Random random(seed, i);
+    rays[i].origin = in_cube(random) * 2.0f;
+    rays[i].direction = in_cube(random);
+    if (i % 7 == 0) rays[i].t_max = random.uniform(0, 2);
+    if (i % 11 == 0) rays[i].t_min = random.uniform(0, 1);
+  }
+  return rays;
+}
+
+std::vector<Hit> traced(const Scene& scene, const RayCastingSettings& settings, const std::vector<Ray>& rays,
+                        Backend backend) {
+  const Stream stream(backend);
+  const RayCaster caster(scene, settings, stream);
+  const Buffer<Ray> on_backend(stream, rays);
+  Buffer<Hit> hits(backend, rays.size());
+  caster.trace(on_backend.data(), hits.data(), rays.size());
+  return hits.to_vector(stream);
+}
+
+std::size_t differences(const std::vector<Hit>& a, const std::vector<Hit>& b) {
+  REQUIRE(a.size() == b.size());
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) count += std::memcmp(&a[i], &b[i], sizeof(Hit)) != 0;
+  return count;
+}
+
+std::vector<vec4> rendered(const Scene& scene, const RayCastingSettings& settings, int width, int height,
+                           Backend backend, std::uint32_t samples = 1) {
+  const Stream stream(backend);
+  RayCaster caster(scene, settings, stream);
+  Film film(stream, width, height);
+  for (std::uint32_t k = 0; k < samples; ++k)
+    caster.add_sample(film, scene.camera, k, samples > 1, 7, [](double) { return true; });
+  Buffer<vec4> pixels(backend, static_cast<std::size_t>(width) * height);
+  copy(pixels.data(), backend, film.pixels(), backend, pixels.bytes(), stream);
+  return pixels.to_vector(stream);
+}
+
+}  // namespace
+
+// Catches: a weight given to the wrong vertex, a wrong sign of t or of the front, an axis mistaken.
+TEST_CASE("each test finds the point it was aimed at, on the right side") {
+  with_every_test([](auto test) {
+    using Test = decltype(test);
+    INFO(name_of<Test>());
+    Random random(1);
+    int hits = 0;
+    for (int k = 0; k < 20000; ++k) {
+      const vec3 a = in_cube(random), b = in_cube(random), c = in_cube(random);
+      const float u = random.uniform(0.1f, 0.4f), v = random.uniform(0.1f, 0.4f);
+      const vec3 aim = a * (1 - u - v) + b * u + c * v;
+      Ray ray;
+      ray.origin = in_cube(random) * 2.0f;
+      ray.direction = aim - ray.origin;  // the hit is at t = 1
+      const dvec3 n = glm::cross(dvec3(b - a), dvec3(c - a));
+      const double incidence = glm::dot(n, dvec3(ray.direction));
+      if (std::fabs(incidence) < 0.05) continue;
+      Solution<float> s{};
+      REQUIRE(intersect<Test>(a, b, c, ray, s));
+      REQUIRE(s.t == Approx(1).margin(1e-4));
+      REQUIRE(s.u == Approx(u).margin(2e-3));
+      REQUIRE(s.v == Approx(v).margin(2e-3));
+      REQUIRE(s.front == (incidence < 0));
+      ++hits;
+    }
+    CHECK(hits > 10000);
+  });
+}
+
+// Catches: an error bound that does not hold, a test that loses digits, hits and misses that no rounding explains.
+TEST_CASE("t stays within the derived bound of the same test in 80-bit arithmetic") {
+  with_every_test([](auto test) {
+    using Test = decltype(test);
+    using Wide = long double;
+    std::size_t compared = 0, unbounded = 0, far = 0, disagreements = 0;
+    double tightest = 0;
+    const std::size_t n = effort(280000);
+    for (std::size_t i = 0; i < n; ++i) {
+      Random random(2, i);
+      const int kind = static_cast<int>(i % 7);  // ordinary to axis-aligned; the rest leaves float's range
+      const Pair p = make_pair(random, kind);
+      Solution<float> s{};
+      Solution<Wide> exact{};
+      RayOf<Wide> wide;
+      wide.origin = Vec3<Wide>(p.ray.origin);
+      wide.direction = Vec3<Wide>(p.ray.direction);
+      const bool hit = intersect<Test>(p.a, p.b, p.c, p.ray, s);
+      const bool truly = intersect<Test>(Vec3<Wide>(p.a), Vec3<Wide>(p.b), Vec3<Wide>(p.c), wide, exact);
+      if (hit != truly) {
+        ++disagreements;
+        const Wide edge = std::min({exact.u, exact.v, 1 - exact.u - exact.v});
+        const double other = std::min({double(s.u), double(s.v), 1.0 - s.u - s.v});
+        far += kind == 0 && (truly ? edge > 1e-3L : other > 1e-3);
+      }
+      if (!hit || !truly) continue;
+      const double bound = t_error_bound<Test>(p.a, p.b, p.c, p.ray, s.t);
+      if (!(bound < error_bounds::infinity)) {
+        ++unbounded;
+        continue;
+      }
+      ++compared;
+      const double error = static_cast<double>(std::fabs(s.t - exact.t));
+      if (bound > 0) tightest = std::max(tightest, error / bound);
+      if (!(error <= bound)) FAIL_CHECK(name_of<Test>() << " pair " << i << " kind " << kind << ": t " << s.t << " error "
+                                        << error << " bound " << bound);
+    }
+    std::printf("  %-16s %zu compared, largest error / bound %.3f, unbounded %zu, hit or miss differs %zu\n",
+                name_of<Test>(), compared, tightest, unbounded, disagreements);
+    CHECK(compared > n / 3);
+    CHECK(tightest > 0.02);  // a bound a hundred times too wide would say nothing
+    CHECK(far <= n / 100000);
+  });
+}
+
+// Catches: NaN or t outside the interval let through, in particular by comparisons written the wrong way round.
+TEST_CASE("no input, however hostile, makes a hit outside the interval") {
+  with_every_test([](auto test) {
+    using Test = decltype(test);
+    for (std::size_t i = 0; i < effort(400000); ++i) {
+      Random random(3, i);
+      Pair p = make_pair(random, static_cast<int>(i % pair_kinds));
+      p.ray.t_min = random.uniform(-1, 1);
+      p.ray.t_max = p.ray.t_min + random.uniform(-0.5f, 2);
+      Solution<float> s{};
+      if (!intersect<Test>(p.a, p.b, p.c, p.ray, s)) continue;
+      const bool good = s.t >= p.ray.t_min && s.t < p.ray.t_max && s.u >= 0 && s.v >= 0 && s.u <= 1 && s.v <= 1;
+      if (!good) FAIL_CHECK(name_of<Test>() << " pair " << i << ": t " << s.t << " u " << s.u << " v " << s.v);
+    }
+  });
+}
+
+// Catches: an edge function whose sign is wrong where its value cancels, overflows or underflows.
+TEST_CASE("edge functions have the sign of exact arithmetic, down to zero") {
+  Random random(4);
+  std::size_t zeros = 0;
+  for (int k = 0; k < 1000000; ++k) {
+    const auto small = [&] { return static_cast<float>(static_cast<int>(random.index(4097)) - 2048); };
+    float a = small(), b = small(), c = small(), d = small();
+    if (a == 0) a = 1;
+    if (k % 3 == 0) c = a, d = b;                                  // exactly zero
+    if (k % 3 == 1) c = std::nextafter(a, 1e9f), d = b;            // nearly zero
+    const __int128 scale = 1 << 24;
+    const auto exact = static_cast<__int128>(double(a) * double(scale)) * static_cast<__int128>(double(b) * double(scale)) -
+                       static_cast<__int128>(double(c) * double(scale)) * static_cast<__int128>(double(d) * double(scale));
+    const float value = difference_of_products(a, b, c, d);
+    zeros += exact == 0;
+    REQUIRE((value > 0) == (exact > 0));
+    REQUIRE((value < 0) == (exact < 0));
+  }
+  CHECK(zeros > 300000);
+}
+
+// Catches: any of the three loop orders that skips, repeats or reorders triangles; block ends; mixed ray axes.
+TEST_CASE("plain loop, blocks and tiles give the same hits, bit for bit") {
+  const std::vector<Ray> rays = random_rays(effort(3000), 5);
+  for (const std::uint32_t count : {0u, 1u, 15u, 16u, 17u, 127u, 128u, 129u, 1000u})
+    for (const bool hostile : {false, true}) {
+      const Scene scene = scene_of(soup(count, 6, hostile));
+      for (const TriangleTest test :
+           {TriangleTest::plane, TriangleTest::moller_trumbore, TriangleTest::baldwin_weber, TriangleTest::watertight})
+        for (const bool one_sided : {false, true}) {
+          RayCastingSettings settings;
+          settings.test = test;
+          settings.one_sided = one_sided;
+          settings.loop = Loop::plain;
+          const std::vector<Hit> plain = traced(scene, settings, rays, Backend::cpu);
+          settings.loop = Loop::blocked;
+          for (const Backend backend : backends()) {
+            INFO(count << " triangles, hostile " << hostile << ", test " << int(test) << " on " << name(backend));
+            CHECK(differences(plain, traced(scene, settings, rays, backend)) == 0);
+          }
+        }
+    }
+}
+
+// Catches: a closest hit that is not the closest, ties that go to the wrong triangle, one-sided hits from behind.
+TEST_CASE("the hit is the nearest of all, the first of equals") {
+  const Mesh mesh = soup(300, 7, false);
+  Mesh twice = mesh;  // every triangle again: each hit is a tie
+  for (const uvec3& t : mesh.triangles) twice.triangles.push_back(t);
+  const std::vector<Ray> rays = random_rays(2000, 8);
+  for (const bool one_sided : {false, true}) {
+    RayCastingSettings settings;
+    settings.one_sided = one_sided;
+    const std::vector<Hit> hits = traced(scene_of(twice), settings, rays, Backend::cpu);
+    for (std::size_t r = 0; r < rays.size(); ++r) {
+      Hit expected;
+      expected.t = rays[r].t_max;
+      for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+        const uvec3 t = mesh.triangles[i];
+        const vec3 a = mesh.positions[t.x], b = mesh.positions[t.y], c = mesh.positions[t.z];
+        Solution<float> s{};
+        if (!intersect<Watertight>(a, b, c, rays[r], s) || s.t >= expected.t) continue;
+        const bool front = glm::dot(glm::cross(dvec3(b - a), dvec3(c - a)), dvec3(rays[r].direction)) < 0;
+        if (front || !one_sided) expected = {s.t, i, 0, s.u, s.v};
+      }
+      REQUIRE(hits[r].primitive == expected.primitive);
+      REQUIRE(hits[r].t == expected.t);
+    }
+  }
+}
+
+// Catches: an any-hit query that disagrees with the closest hit, or a probe that does not count.
+TEST_CASE("occluded says whether there is a closest hit, and stops at the first") {
+  const Mesh mesh = soup(200, 9, false);
+  std::vector<float> numbers(mesh.triangles.size() * Watertight::numbers);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+    Watertight::prepare(mesh.positions[3 * i], mesh.positions[3 * i + 1], mesh.positions[3 * i + 2],
+                        &numbers[i * Watertight::numbers]);
+  const BruteForce<Triangles<Watertight>> structure{{numbers.data(), 200, false}};
+  int found = 0;
+  for (const Ray& ray : random_rays(3000, 10)) {
+    Probe closest, any;
+    const Hit hit = structure.closest(ray, closest);
+    REQUIRE(structure.occluded(ray, any) == hit.found());
+    REQUIRE(closest.primitives_tested == 200);
+    REQUIRE(any.primitives_tested <= (hit.found() ? hit.primitive + 1 : 200));
+    found += hit.found();
+  }
+  CHECK(found > 300);
+}
+
+// Catches: leaks at edges and vertices, at any size and distance; a t that is worse than promised.
+TEST_CASE("the watertight test misses nothing from inside closed meshes, and keeps its bound") {
+  struct Case {
+    const char* name;
+    double size, offset;
+  };
+  const Case cases[] = {{"size 1e-18", 1e-18, 0}, {"size 1e-9", 1e-9, 0},   {"size 1", 1, 0},
+                        {"size 1e9", 1e9, 0},     {"size 1e18", 1e18, 0},   {"1e3 sizes away", 1, 1e3},
+                        {"1e5 sizes away", 1, 1e5}, {"1e-18, 1e5 away", 1e-18, 1e5}, {"1e18, 1e5 away", 1e18, 1e5},
+                        {"1e7 sizes away", 1, 1e7}};
+  const std::pair<const char*, std::function<Mesh(double, dvec3)>> meshes[] = {
+      {"20", [](double s, dvec3 c) { return icosphere(0, s, c); }},
+      {"320", [](double s, dvec3 c) { return icosphere(2, s, c); }},
+      {"1280", [](double s, dvec3 c) { return icosphere(3, s, c); }},
+      {"420 spiky", [](double s, dvec3 c) { return spiky_sphere(15, 15, 1, s, c); }}};
+  const char* effort_text = std::getenv("TRILHA_EFFORT");
+  const std::uint64_t factor = effort_text ? std::strtoull(effort_text, nullptr, 10) : 1;
+  for (const Backend backend : backends()) {
+    const Stream stream(backend);
+    if (factor > 10 && backend == Backend::cpu) continue;  // 10⁹ rays are for the device
+    const std::uint64_t wanted = 8500 * factor;  // 10 cases × 4 meshes × 3 aims: 10⁶ rays in all
+    std::printf("  %s: misses / beyond the bound, of %llu rays a cell\n", name(backend), (unsigned long long)wanted);
+    WatertightCounts total;
+    std::uint64_t others[3] = {};
+    for (const Case& c : cases) {
+      WatertightCounts row;
+      std::uint64_t row_others[3] = {};
+      for (const auto& [mesh_name, make] : meshes) {
+        const dvec3 centre = glm::normalize(dvec3(148376, 1234, -223423)) * (c.offset * c.size);
+        const Mesh mesh = make(c.size, centre);
+        const Buffer positions(stream, mesh.positions);
+        const Buffer triangles(stream, mesh.triangles);
+        const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
+        const ClosedMesh closed{positions.data(), triangles.data(), count, centre, c.size, c.offset > 1e6};
+        for (const Aim aim : {Aim::anywhere, Aim::edges, Aim::vertices}) {
+          int other = 0;
+          with_every_test([&](auto test) {
+            using Test = decltype(test);
+            Buffer<float> numbers(backend, static_cast<std::size_t>(count) * Test::numbers);
+            for_each(stream, count,
+                     PrepareTriangles<Test>{positions.data(), triangles.data(), count, 1, numbers.data()});
+            const BruteForce<Triangles<Test>> structure{{numbers.data(), count, false}};
+            // the three others are there for comparison: fewer rays give their rates
+            constexpr bool judged = std::is_same_v<Test, Watertight>;
+            const std::uint64_t rays = judged ? wanted : std::max<std::uint64_t>(wanted / 10, 800);
+            const auto counts =
+                watertight_trial<Test>(stream, structure, closed, aim, 11, c.offset > 1e6 ? rays / 4 : rays);
+            if (judged) {
+              row.rays += counts.rays, row.misses += counts.misses;
+              row.beyond_bound += counts.beyond_bound, row.unbounded += counts.unbounded;
+              INFO(c.name << ", " << mesh_name << " triangles, aim " << int(aim));
+              CHECK(counts.rays > 0);
+              CHECK(counts.misses == 0);
+              CHECK(counts.beyond_bound == 0);
+            } else {
+              row_others[other++] += (counts.misses + counts.wrong) * 10000000 / std::max<std::uint64_t>(counts.rays, 1) / 12;
+            }
+          });
+        }
+      }
+      std::printf("    %-16s %10llu rays: watertight %llu misses, %llu beyond, %llu unbounded; missed or t off by 1 %% in 10^7: plane "
+                  "%llu, Moller-Trumbore %llu, Baldwin-Weber %llu\n",
+                  c.name, (unsigned long long)row.rays, (unsigned long long)row.misses,
+                  (unsigned long long)row.beyond_bound, (unsigned long long)row.unbounded,
+                  (unsigned long long)row_others[0], (unsigned long long)row_others[1],
+                  (unsigned long long)row_others[2]);
+      total.rays += row.rays, total.unbounded += row.unbounded;
+      for (int k = 0; k < 3; ++k) others[k] += row_others[k];
+    }
+    CHECK(total.unbounded < total.rays / 100);
+    CHECK(others[1] > 0);  // the trial can tell a leak: Möller–Trumbore has them
+  }
+}
+
+// Catches: any operation that rounds differently on the two machines.
+TEST_CASE("t, u and v are the same bits on CPU and CUDA") {
+  require_cuda();
+  const std::size_t chunk = std::size_t{pair_kinds} << 18, chunks = std::max<std::size_t>(1, effort(1));
+  with_every_test([&](auto test) {
+    using Test = decltype(test);
+    std::size_t different = 0, hits = 0;
+    Buffer<PairResult> host(Backend::cpu, chunk), device(Backend::cuda, chunk);
+    for (std::size_t k = 0; k < chunks; ++k) {
+      for_each(Backend::cpu, chunk, TestPairs<Test>{12, k * chunk, host.data()});
+      for_each(Backend::cuda, chunk, TestPairs<Test>{12, k * chunk, device.data()});
+      const std::vector<PairResult> there = device.to_vector(Backend::cuda);
+      for (std::size_t i = 0; i < chunk; ++i) {
+        different += !(there[i] == host.data()[i]);
+        hits += there[i].hit;
+      }
+    }
+    std::printf("  %-16s %zu pairs, %zu hits, %zu different\n", name_of<Test>(), chunk * chunks, hits, different);
+    CHECK(different == 0);
+    CHECK(hits > chunk * chunks / 5);
+  });
+}
+
+// Catches: a pass that is not the same on both machines, from the camera to the film.
+TEST_CASE("images are the same bits on CPU and CUDA") {
+  require_cuda();
+  const Scene scene = scene_of(icosphere(3));
+  for (const Shading shading : {Shading::lambert, Shading::normals, Shading::depth, Shading::primitive,
+                                Shading::barycentrics, Shading::facing, Shading::tests})
+    for (const bool smooth : {false, true}) {
+      RayCastingSettings settings;
+      settings.shading = shading;
+      settings.smooth = smooth;
+      const auto on_cpu = rendered(scene, settings, 201, 143, Backend::cpu, 2);
+      const auto on_cuda = rendered(scene, settings, 201, 143, Backend::cuda, 2);
+      INFO("shading " << int(shading) << ", smooth " << smooth);
+      CHECK(std::memcmp(on_cpu.data(), on_cuda.data(), on_cpu.size() * sizeof(vec4)) == 0);
+    }
+}
+
+// Catches: a pixel that no index covers or two do, for sizes that tiles do not divide.
+TEST_CASE("the tiling covers every pixel once") {
+  for (const auto& [width, height] : {std::pair{1, 1}, {32, 32}, {33, 31}, {640, 480}, {7, 201}}) {
+    const Tiling tiling{std::uint32_t(width), std::uint32_t(height)};
+    std::vector<int> seen(static_cast<std::size_t>(width) * height);
+    for (std::size_t i = 0; i < tiling.size(); ++i)
+      if (const auto p = tiling.pixel(i); tiling.inside(p)) ++seen[tiling.offset(p)];
+    CHECK(std::count(seen.begin(), seen.end(), 1) == static_cast<std::ptrdiff_t>(seen.size()));
+  }
+}
+
+// Catches: a mirrored, upside-down or stretched image, a wrong field of view, samples off the pixel's centre.
+TEST_CASE("the pinhole camera maps pixels to directions as geometry says") {
+  Camera camera;
+  camera.eye = {0, 0, 5};
+  camera.target = {0, 0, 0};
+  camera.field_of_view = 90;
+  const PinholeCamera pinhole = PinholeCamera::make(camera, 200, 100);
+  const vec3 middle = pinhole.ray(0.5f, 0.5f).direction;
+  CHECK(glm::length(middle - vec3(0, 0, -1)) < 1e-6f);
+  const vec3 upper_left = pinhole.ray(0, 0).direction;  // half height 1 at distance 1, twice as wide
+  CHECK(glm::length(upper_left - glm::normalize(vec3(-2, 1, -1))) < 1e-6f);
+  for (float x = 0; x <= 1; x += 0.125f) CHECK(glm::length(pinhole.ray(x, 0.3f).direction) == Approx(1).margin(1e-6));
+  camera.up = {0, 0, 1};
+  CHECK_THROWS_AS(PinholeCamera::make(camera, 200, 100), InputError);
+  camera.up = {0, 1, 0};
+  camera.target = camera.eye;
+  CHECK_THROWS_AS(PinholeCamera::make(camera, 200, 100), InputError);
+}
+
+// Catches: normals that are not the surface's, a cosine that is not the light's, interpolation with wrong weights.
+TEST_CASE("shading of a sphere agrees with the sphere") {
+  Scene scene = scene_of(icosphere(5));
+  scene.materials[0].diffuse = vec3(1);
+  const int size = 64;
+  const PinholeCamera pinhole = PinholeCamera::make(scene.camera, size, size);
+  RayCastingSettings settings;
+  settings.smooth = true;
+  const auto lambert = rendered(scene, settings, size, size, Backend::cpu);
+  settings.shading = Shading::normals;
+  const auto normals = rendered(scene, settings, size, size, Backend::cpu);
+  settings.shading = Shading::facing;
+  const auto facing = rendered(scene, settings, size, size, Backend::cpu);
+  int hits = 0;
+  for (int y = 0; y < size; ++y)
+    for (int x = 0; x < size; ++x) {
+      const Ray ray = pinhole.ray((x + 0.5f) / size, (y + 0.5f) / size);
+      const dvec3 o(ray.origin), d(ray.direction);
+      const double b = glm::dot(o, d), discriminant = b * b - (glm::dot(o, o) - 1);
+      if (discriminant < 0.05) continue;  // the silhouette of the mesh is not the sphere's
+      const dvec3 n = o + d * (-b - std::sqrt(discriminant));
+      const std::size_t i = static_cast<std::size_t>(y) * size + x;
+      REQUIRE(lambert[i].x == Approx(-glm::dot(n, d)).margin(0.005));
+      for (int k = 0; k < 3; ++k) REQUIRE(normals[i][k] == Approx(0.5 * n[k] + 0.5).margin(0.005));
+      REQUIRE(facing[i].z > facing[i].x);  // blue: the front
+      ++hits;
+    }
+  CHECK(hits > 500);
+}
+
+// Catches: something left out that the image needed, or nothing left out.
+TEST_CASE("what is left out changes no pixel and saves memory") {
+  Mesh mesh = icosphere(3);
+  make_normals(mesh);
+  mesh.texture_coordinates.assign(mesh.positions.size(), vec2(0.5f));
+  mesh.materials.assign(mesh.triangles.size(), 0);
+  for (std::size_t i = 0; i < mesh.materials.size(); i += 2) mesh.materials[i] = 1;
+  Scene scene = scene_of(mesh);
+  scene.materials.push_back({"red", vec3(0.8f, 0.1f, 0.1f)});
+  scene.features = features_of(scene);
+  REQUIRE(scene.features.texture_coordinates);
+  REQUIRE(scene.features.materials);
+  for (const Backend backend : backends())
+    for (const Shading shading : {Shading::lambert, Shading::normals, Shading::depth, Shading::primitive,
+                                  Shading::barycentrics, Shading::facing, Shading::tests})
+      for (const bool smooth : {false, true}) {
+        RayCastingSettings lean, full;
+        lean.shading = full.shading = shading;
+        lean.smooth = full.smooth = smooth;
+        full.specialise = false;
+        INFO("shading " << int(shading) << ", smooth " << smooth << " on " << name(backend));
+        const auto image = rendered(scene, lean, 160, 90, backend);
+        const auto full_image = rendered(scene, full, 160, 90, backend);
+        CHECK(std::memcmp(image.data(), full_image.data(), image.size() * sizeof(vec4)) == 0);
+        const std::size_t before = live_bytes(backend);
+        const RayCaster lean_caster(scene, lean, backend);
+        const std::size_t lean_bytes = live_bytes(backend) - before;
+        const RayCaster full_caster(scene, full, backend);
+        const std::size_t full_bytes = live_bytes(backend) - before - lean_bytes;
+        const std::size_t uvs = mesh.positions.size() * sizeof(vec2);
+        CHECK(full_bytes >= lean_bytes + uvs);
+        if (shading == Shading::depth)
+          CHECK(lean_bytes == (mesh.triangles.size() + (backend == Backend::cpu ? 15 : 0)) /
+                                  (backend == Backend::cpu ? 16 : 1) * (backend == Backend::cpu ? 16 : 1) *
+                                  Watertight::numbers * sizeof(float));
+      }
+}
+
+// Catches: a stop that loses what was rendered, or that is not heeded.
+TEST_CASE("a render that is stopped keeps the pixels done so far") {
+  const Scene scene = scene_of(icosphere(2));
+  RayCaster caster(scene, {}, Backend::cpu);
+  Film film(Backend::cpu, 640, 640);
+  int bands = 0;
+  CHECK_FALSE(caster.add_sample(film, scene.camera, 0, false, 0, [&](double) { return ++bands < 2; }));
+  CHECK(bands == 2);
+  std::size_t done = 0;
+  for (std::size_t i = 0; i < 640 * 640; ++i) done += film.pixels()[i].w == 1;
+  CHECK(done >= 2 * Tiling::tile_size);
+  CHECK(done < 640 * 640);
+}

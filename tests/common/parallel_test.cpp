@@ -1,0 +1,341 @@
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include "common/math/random.h"
+#include "common/parallel/algorithms.h"
+#include "common/parallel/bands.h"
+#include "common/parallel/buffer.h"
+#include "common/parallel/for_each.h"
+#include "tests/testing.h"
+
+using namespace trilha;
+using namespace trilha::testing;
+
+namespace {
+
+/// Sizes at which blocks, warps and tasks end, and random ones between.
+std::vector<std::size_t> sizes() {
+  std::vector<std::size_t> result{0, 1, 2, 31, 32, 33, 255, 256, 257, 1023, 1025, 32767, 65537, 1000003};
+  Random random(1);
+  for (int k = 0; k < 6; ++k) result.push_back(random.index(300000));
+  return result;
+}
+
+template <class T>
+std::vector<T> random_values(std::size_t n, std::uint64_t seed, std::uint32_t below) {
+  std::vector<T> values(n);
+  Random random(seed);
+  for (T& value : values) value = static_cast<T>(random.index(below));
+  return values;
+}
+
+struct Square {
+  const std::uint32_t* in;
+  std::uint32_t* out;
+  TRILHA_HD void operator()(std::size_t i) const { out[i] = in[i] * in[i]; }
+};
+
+/// Marks the index, relative to a base beyond 2³², and writes wrong numbers where the index was cut to 32 bits.
+struct MarkFar {
+  std::size_t base;
+  std::uint8_t* marks;
+  TRILHA_HD void operator()(std::size_t i) const {
+    if (i >= base) ++marks[i - base];
+  }
+};
+
+/// Counts indices into a byte a 2²⁰ of them; only the multiples of 2²⁰ write.
+struct MarkMultiples {
+  std::uint8_t* marks;
+  TRILHA_HD void operator()(std::size_t i) const {
+    if (i % (std::size_t{1} << 20) == 0) ++marks[i >> 20];
+  }
+};
+
+double best_ms(int turns, const std::function<void()>& work) {
+  double best = 1e300;
+  for (int k = 0; k < turns; ++k) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    best = std::min(best, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+  }
+  return best;
+}
+
+}  // namespace
+
+// Catches: an index skipped, done twice, or written to the wrong place.
+TEST_CASE("for_each visits every index once") {
+  for (const Backend backend : backends())
+    for (const std::size_t n : sizes()) {
+      const auto values = random_values<std::uint32_t>(n, n, 60000);
+      const Buffer<std::uint32_t> in(backend, values);
+      Buffer<std::uint32_t> out(backend, n);
+      for_each(backend, n, Square{in.data(), out.data()});
+      const auto result = out.to_vector(backend);
+      INFO(n << " on " << name(backend));
+      REQUIRE(std::equal(values.begin(), values.end(), result.begin(), [](auto a, auto b) { return a * a == b; }));
+    }
+}
+
+// Catches: indices held in 32 bits, signed or not.
+TEST_CASE("for_each counts beyond 2^31 and 2^32") {
+  for (const Backend backend : backends()) {
+    for (const std::size_t base : {(std::size_t{1} << 31) - 3, (std::size_t{1} << 32) - 3, std::size_t{1} << 40}) {
+      Buffer<std::uint8_t> marks(backend, 1000);
+      fill_bytes(backend, marks.data(), 0, marks.bytes());
+      for_each(backend, {base, base + 1000}, MarkFar{base, marks.data()});
+      const auto result = marks.to_vector(backend);
+      CHECK(std::count(result.begin(), result.end(), 1) == 1000);
+    }
+    const std::size_t n = (std::size_t{1} << 31) + (std::size_t{1} << 21);
+    Buffer<std::uint8_t> marks(backend, n >> 20);
+    fill_bytes(backend, marks.data(), 0, marks.bytes());
+    for_each(backend, n, MarkMultiples{marks.data()});
+    const auto result = marks.to_vector(backend);
+    CHECK(std::count(result.begin(), result.end(), 1) == static_cast<std::ptrdiff_t>(n >> 20));
+  }
+}
+
+// Catches: elements left out at block ends, a start value lost or taken twice, a wrong neutral element.
+TEST_CASE("reduce is the standard library's accumulate") {
+  for (const Backend backend : backends())
+    for (const std::size_t n : sizes()) {
+      INFO(n << " on " << name(backend));
+      const auto values = random_values<std::uint32_t>(n, n + 1, 0xffffffffu);
+      const Buffer<std::uint32_t> data(backend, values);
+      CHECK(reduce(backend, data.data(), n, std::uint32_t{0}, Sum{}) ==
+            std::accumulate(values.begin(), values.end(), std::uint32_t{0}));
+      std::uint32_t lowest = 4000000000u, highest = 5;
+      for (const std::uint32_t value : values) lowest = std::min(lowest, value), highest = std::max(highest, value);
+      CHECK(reduce(backend, data.data(), n, 4000000000u, Minimum{}) == lowest);
+      CHECK(reduce(backend, data.data(), n, 5u, Maximum{}) == highest);
+
+      const std::vector<std::uint64_t> wide(values.begin(), values.end());
+      const Buffer<std::uint64_t> wide_data(backend, wide);
+      CHECK(reduce(backend, wide_data.data(), n, std::uint64_t{0}, Sum{}) ==
+            std::accumulate(wide.begin(), wide.end(), std::uint64_t{0}));
+
+      std::vector<float> floats(values.begin(), values.end());
+      const Buffer<float> float_data(backend, floats);
+      const double sum = std::accumulate(floats.begin(), floats.end(), 0.0);
+      CHECK(reduce(backend, float_data.data(), n, 0.0f, Sum{}) == Approx(sum).epsilon(1e-5));  // log₂ n roundings
+      CHECK(reduce(backend, float_data.data(), n, 1e30f, Minimum{}) ==
+            std::accumulate(floats.begin(), floats.end(), 1e30f, Minimum{}));
+
+      std::vector<Box> boxes(n);
+      Box all;
+      for (std::size_t i = 0; i < n; ++i) {
+        const auto x = static_cast<float>(values[i] % 1000), y = static_cast<float>(values[i] % 777);
+        boxes[i] = i % 5 == 0 ? Box{} : Box{{x, y, -x}, {x + 1, y + 2, -x + 3}};  // some are empty
+        all = united(all, boxes[i]);
+      }
+      const Buffer<Box> box_data(backend, boxes);
+      const Box result = reduce(backend, box_data.data(), n, Box{}, United{});
+      CHECK(result.lower == all.lower);
+      CHECK(result.upper == all.upper);
+    }
+}
+
+// Catches: blocks joined with the wrong sum, an inclusive scan, trouble in place.
+TEST_CASE("exclusive_scan is the standard library's") {
+  for (const Backend backend : backends())
+    for (const std::size_t n : sizes()) {
+      INFO(n << " on " << name(backend));
+      const auto values = random_values<std::uint32_t>(n, n + 2, 0xffffffffu);  // sums wrap round
+      std::vector<std::uint32_t> expected(n);
+      std::exclusive_scan(values.begin(), values.end(), expected.begin(), std::uint32_t{0});
+      Buffer<std::uint32_t> data(backend, values);
+      Buffer<std::uint32_t> sums(backend, n);
+      exclusive_scan(backend, data.data(), sums.data(), n);
+      REQUIRE(sums.to_vector(backend) == expected);
+      exclusive_scan(backend, data.data(), data.data(), n);
+      REQUIRE(data.to_vector(backend) == expected);
+
+      const std::vector<std::uint64_t> wide(values.begin(), values.end());
+      std::vector<std::uint64_t> wide_expected(n);
+      std::exclusive_scan(wide.begin(), wide.end(), wide_expected.begin(), std::uint64_t{0});
+      Buffer<std::uint64_t> wide_data(backend, wide);
+      exclusive_scan(backend, wide_data.data(), wide_data.data(), n);
+      REQUIRE(wide_data.to_vector(backend) == wide_expected);
+    }
+}
+
+// Catches: an unstable or wrong order, values parted from their keys, key bits that are not looked at.
+TEMPLATE_TEST_CASE("sort_by_key is the standard library's stable_sort", "", std::uint32_t, std::uint64_t) {
+  for (const Backend backend : backends())
+    for (const std::size_t n : sizes())
+      for (const std::uint32_t below : {3u, 1u << 30, 0xffffffffu}) {
+        INFO(n << " keys below " << below << " on " << name(backend));
+        auto keys = random_values<TestType>(n, n + below, below);
+        if constexpr (sizeof(TestType) == 8)
+          for (TestType& key : keys) key |= key << 32;  // high halves count, too
+        std::vector<std::uint32_t> order(n);
+        std::iota(order.begin(), order.end(), 0);
+        Buffer<TestType> key_data(backend, keys);
+        Buffer<std::uint32_t> value_data(backend, order);
+        const int bits = sizeof(TestType) == 8 ? 64 : below == 3 ? 2 : below == 1u << 30 ? 30 : 32;
+        sort_by_key(backend, key_data.data(), value_data.data(), n, bits);
+        std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return keys[a] < keys[b]; });
+        REQUIRE(value_data.to_vector(backend) == order);
+        std::sort(keys.begin(), keys.end());
+        REQUIRE(key_data.to_vector(backend) == keys);
+      }
+}
+
+// Catches: flags other than 1 not seen, an index lost or moved, a wrong count.
+TEST_CASE("compact keeps the flagged indices in order") {
+  for (const Backend backend : backends())
+    for (const std::size_t n : sizes())
+      for (const std::uint32_t below : {1u, 2u, 256u}) {  // none set, half, nearly all
+        INFO(n << " flags below " << below << " on " << name(backend));
+        const auto flags = random_values<std::uint8_t>(n, n + 3, below);
+        std::vector<std::uint32_t> expected;
+        for (std::size_t i = 0; i < n; ++i)
+          if (flags[i] != 0) expected.push_back(static_cast<std::uint32_t>(i));
+        const Buffer<std::uint8_t> data(backend, flags);
+        Buffer<std::uint32_t> indices(backend, n);
+        REQUIRE(compact(backend, data.data(), n, indices.data()) == expected.size());
+        auto result = indices.to_vector(backend);
+        result.resize(expected.size());
+        REQUIRE(result == expected);
+      }
+}
+
+// Catches: a leak, a byte counted twice, a moved-from buffer that frees.
+TEST_CASE("buffers count their bytes and move without copying") {
+  for (const Backend backend : backends()) {
+    const std::size_t before = live_bytes(backend);
+    {
+      Buffer<std::uint32_t> a(backend, 1000);
+      CHECK(live_bytes(backend) == before + 4000);
+      const auto* where = a.data();
+      Buffer<std::uint32_t> b = std::move(a);
+      CHECK(b.data() == where);
+      CHECK(live_bytes(backend) == before + 4000);
+      b = Buffer<std::uint32_t>(backend, 10);
+      const Buffer<std::uint32_t> c = b.to(Backend::cpu, backend);
+      CHECK(c.size() == 10);
+    }
+    CHECK(live_bytes(backend) == before);
+    CHECK_THROWS_AS(Buffer<double>(backend, std::size_t{1} << 62), std::bad_alloc);
+    CHECK_THROWS(Buffer<double>(backend, std::size_t{1} << 50));
+    CHECK(live_bytes(backend) == before);
+  }
+}
+
+// Catches: a band missing, overlapping or longer than allowed, a stop that is not heeded.
+TEST_CASE("bands cover the range once, within their limit, and stop when told") {
+  for (const std::size_t n : {0u, 1u, 7u, 1000u}) {
+    std::size_t expected = 0;
+    CHECK(for_each_band(
+        Backend::cpu, n, 3, 20, 1e9,
+        [&](std::size_t begin, std::size_t end) {
+          CHECK(begin == expected);
+          CHECK(end > begin);
+          CHECK(end - begin <= 20);
+          expected = end;
+        },
+        [](double) { return true; }));
+    CHECK(expected == n);
+  }
+  int bands = 0;
+  CHECK_FALSE(for_each_band(
+      Backend::cpu, 100, 1, 1, 1, [&](std::size_t, std::size_t) { ++bands; }, [&](double) { return bands < 4; }));
+  CHECK(bands == 4);
+}
+
+// Catches: CUDA asked for and absent, but not refused.
+TEST_CASE("a backend that is missing is refused with a reason") {
+  const std::string reason = why_unavailable(Backend::cuda);
+  CHECK(why_unavailable(Backend::cpu).empty());
+  if (reason.empty()) return;
+  CHECK_THROWS_AS(Stream(Backend::cuda), DeviceError);
+  CHECK_THROWS(Buffer<int>(Backend::cuda, 1));
+}
+
+namespace {
+struct Fault {
+  int* nowhere;
+  TRILHA_HD void operator()(std::size_t i) const { nowhere[i] = 1; }
+};
+}  // namespace
+
+// Catches: errors of the device that pass unseen. It spoils the process's device, so it runs alone and last: [.fault]
+TEST_CASE("an error on the device becomes an exception that names call and place", "[.fault]") {
+  require_cuda();
+  try {
+    for_each(Backend::cuda, 100, Fault{nullptr});
+    Stream(Backend::cuda).synchronize();
+    FAIL("the fault was not seen");
+  } catch (const std::exception& error) {
+    const std::string text = error.what();
+    std::printf("  %s\n", text.c_str());
+    CHECK(text.find("runtime.cu:") != std::string::npos);
+    CHECK(text.find("cudaStreamSynchronize") != std::string::npos);
+    CHECK(text.find("cudaErrorIllegalAddress") != std::string::npos);
+  }
+}
+
+// Catches: a primitive that costs more than the loop it replaces. On a busy machine a turn can be slow, so the best of
+// many counts, and what is compared takes turns.
+TEST_CASE("on the CPU no primitive is slower than a serial loop at 10^6 elements", "[timing]") {
+  constexpr std::size_t n = 1000000;
+  const auto values = random_values<std::uint32_t>(n, 1, 0xffffffffu);
+  const auto flags = random_values<std::uint8_t>(n, 2, 2);
+  std::vector<std::uint32_t> out(n), keys(n), payload(n);
+  struct Item {
+    std::uint32_t key, value;
+  };
+  std::vector<Item> items(n);
+  std::uint32_t sink = 0;
+  const struct {
+    const char* name;
+    int turns;
+    std::function<void()> ours, serial;
+  } rows[] = {
+      {"for_each", 60, [&] { for_each(Backend::cpu, n, Square{values.data(), out.data()}, 1 << 15); },
+       [&] {
+         for (std::size_t i = 0; i < n; ++i) out[i] = values[i] * values[i];
+       }},
+      {"reduce", 60, [&] { sink += reduce(Backend::cpu, values.data(), n, 0u, Sum{}); },
+       [&] {
+         for (std::size_t i = 0; i < n; ++i) sink += values[i];
+       }},
+      {"exclusive_scan", 60, [&] { exclusive_scan(Backend::cpu, values.data(), out.data(), n); },
+       [&] {
+         std::uint32_t sum = 0;
+         for (std::size_t i = 0; i < n; ++i) out[i] = sum, sum += values[i];
+       }},
+      {"sort_by_key", 5,
+       [&] {
+         keys = values;
+         sort_by_key(Backend::cpu, keys.data(), payload.data(), n);
+       },
+       [&] {
+         for (std::size_t i = 0; i < n; ++i) items[i] = {values[i], payload[i]};
+         std::stable_sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.key < b.key; });
+         for (std::size_t i = 0; i < n; ++i) keys[i] = items[i].key, payload[i] = items[i].value;
+       }},
+      {"compact", 60, [&] { sink += static_cast<std::uint32_t>(compact(Backend::cpu, flags.data(), n, out.data())); },
+       [&] {
+         std::uint32_t count = 0;
+         for (std::size_t i = 0; i < n; ++i)
+           if (flags[i] != 0) out[count++] = static_cast<std::uint32_t>(i);
+         sink += count;
+       }},
+  };
+  for (const auto& row : rows) {
+    double ours = 1e300, serial = 1e300;
+    for (int turn = 0; turn < row.turns; ++turn) {
+      ours = std::min(ours, best_ms(1, row.ours));
+      serial = std::min(serial, best_ms(1, row.serial));
+    }
+    std::printf("  %-16s %.3f ms, serial %.3f ms, ratio %.2f\n", row.name, ours, serial, ours / serial);
+    CHECK(ours <= 1.05 * serial);
+  }
+  CHECK(sink != 1);
+}

@@ -1,0 +1,248 @@
+// The contract that every chapter's program keeps, seen from outside: exit codes, one line, nothing half-written.
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/testing.h"
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+namespace {
+
+struct Result {
+  int code;
+  std::string out, err;
+};
+
+std::string contents(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// A folder that is gone afterwards, with a space in its name.
+struct Folder {
+  fs::path path = fs::temp_directory_path() / ("trilha program " + std::to_string(getpid()));
+  Folder() {
+    fs::remove_all(path);
+    fs::create_directories(path);
+  }
+  ~Folder() { fs::remove_all(path); }
+  fs::path operator/(const std::string& name) const { return path / name; }
+  std::size_t files() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), {})); }
+};
+
+std::string program() {
+  const char* other = std::getenv("TRILHA_PROGRAM");
+  return other ? other : TRILHA_PROGRAM;
+}
+
+/// Runs the program in the folder; {} in the arguments stands for the folder. A signal may be sent after a while.
+Result run(const Folder& folder, std::string arguments, double interrupt_after = -1) {
+  for (std::size_t at; (at = arguments.find("{}")) != std::string::npos;)
+    arguments.replace(at, 2, "'" + folder.path.string() + "'");
+  const fs::path out = fs::temp_directory_path() / ("trilha_out" + std::to_string(getpid()));
+  const fs::path err = fs::temp_directory_path() / ("trilha_err" + std::to_string(getpid()));
+  const std::string command =
+      "cd '" + folder.path.string() + "' && exec '" + program() + "' " + arguments + " >" + out.string() + " 2>" + err.string();
+  const pid_t child = fork();
+  if (child == 0) {
+    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+    _exit(127);
+  }
+  if (interrupt_after >= 0) {
+    usleep(static_cast<useconds_t>(interrupt_after * 1e6));
+    kill(child, SIGINT);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  Result result{WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), contents(out), contents(err)};
+  fs::remove(out);
+  fs::remove(err);
+  return result;
+}
+
+std::size_t lines(const std::string& text) { return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')); }
+
+void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+
+const char* const triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+}  // namespace
+
+// Catches: a refusal without a reason, in more than a line, with the wrong code, or that leaves a file behind.
+TEST_CASE("what is refused is refused in one line, with its exit code, and nothing is written") {
+  Folder folder;
+  write(folder / "good.obj", triangle);
+  write(folder / "empty.obj", "");
+  write(folder / "nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n");
+  write(folder / "binary.obj", std::string("v 0 0 0\n\0\1\2", 11));
+  write(folder / "range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
+  write(folder / "scene.xyz", "nothing");
+  write(folder / "bad.ini", "no-such-flag = 3\n");
+  fs::create_directory(folder / "folder.obj");
+  const std::size_t files = folder.files();
+  const struct {
+    const char* arguments;
+    int code;
+    const char* words;
+  } cases[] = {
+      {"--scene missing.obj", 1, "missing.obj"},
+      {"--scene no_such_scene", 1, "teaset"},
+      {"--scene empty.obj", 1, "empty.obj"},
+      {"--scene folder.obj", 1, "folder.obj"},
+      {"--scene binary.obj", 1, "binary.obj"},
+      {"--scene nan.obj", 1, "nan.obj:2"},
+      {"--scene range.obj", 1, "range.obj:4"},
+      {"--scene scene.xyz", 1, "scene.xyz"},
+      {"--scene good.obj --size 0x10", 1, "--size"},
+      {"--scene good.obj --size 10x-1", 1, "--size"},
+      {"--scene good.obj --size 1000000x1000000", 1, "--size"},
+      {"--scene good.obj --size 99999999999999999999x1", 2, "--size"},
+      {"--scene good.obj --size ten", 2, "--size"},
+      {"--scene good.obj --samples 0", 1, "--samples"},
+      {"--scene good.obj --samples 1.5", 2, "--samples"},
+      {"--scene good.obj --fov 180", 1, "--fov"},
+      {"--scene good.obj --fov nan", 1, "--fov"},
+      {"--scene good.obj --eye 1,2", 2, "--eye"},
+      {"--scene good.obj --eye 1,2,inf", 1, "--eye"},
+      {"--scene good.obj --eye 0,0,0 --target 0,0,0", 1, "eye"},
+      {"--scene good.obj --output nowhere/image.png", 1, "nowhere/image.png"},
+      {"--scene good.obj --output image.bmp", 1, ".bmp"},
+      {"--scene good.obj --output {}", 1, "trilha program"},
+      {"--scene good.obj --output folder.obj", 1, "folder.obj"},
+      {"--scene good.obj --output /dev/full", 1, "No space left"},
+      {"--scene good.obj --threads -1", 1, "--threads"},
+      {"--scene good.obj --test no-such-test", 2, "watertight"},
+      {"--scene good.obj --shading", 2, "--shading"},
+      {"--scene good.obj --no-such-flag", 2, "--no-such-flag"},
+      {"--scene good.obj --heatmap beauty", 2, "tests"},
+      {"--scene good.obj --backend gpu", 2, "cuda"},
+      {"--scene good.obj --time 1 --samples 2", 2, "--samples"},
+      {"--scene good.obj --config missing.ini", 1, "missing.ini"},
+      {"--scene good.obj --config bad.ini", 2, "no-such-flag"},
+      {"stray", 2, "stray"},
+  };
+  for (const auto& c : cases) {
+    const Result result = run(folder, c.arguments);
+    INFO(c.arguments << "\n" << result.err);
+    CHECK(result.code == c.code);
+    CHECK(lines(result.err) == 1);
+    CHECK(result.err.find(c.words) != std::string::npos);
+    CHECK(result.out.empty());
+    CHECK(folder.files() == files);
+  }
+}
+
+// Catches: CUDA asked for and absent, but rendered on the CPU all the same.
+TEST_CASE("CUDA that is asked for and absent is exit code 3") {
+  if (trilha::why_unavailable(trilha::Backend::cuda).empty()) return;
+  Folder folder;
+  const Result result = run(folder, "--scene teapot --backend cuda");
+  CHECK(result.code == 3);
+  CHECK(lines(result.err) == 1);
+  CHECK(folder.files() == 0);
+}
+
+// Catches: a disk that fills up unseen. A limit on file sizes makes every write beyond it fail.
+TEST_CASE("a disk that is full leaves no half image") {
+  Folder folder;
+  write(folder / "good.obj", triangle);
+  const std::string limited = "sh -c 'trap \"\" XFSZ; ulimit -f 1; cd \"" + folder.path.string() + "\"; \"" + program() +
+                              "\" --scene good.obj --shading depth --size 640x480 --output big.hdr' >/dev/null 2>&1";
+  const int status = std::system(limited.c_str());
+  CHECK(WEXITSTATUS(status) == 1);
+  CHECK(folder.files() == 1);
+}
+
+// Catches: names and types that tools rely on, going missing from --json.
+TEST_CASE("the JSON has the fixed names, and numbers that fit together") {
+  Folder folder;
+  write(folder / "good.obj", triangle);
+  const Result result = run(folder, "--scene good.obj --json --explain --size 64x48 --samples 2 --backend cpu --output a.png");
+  REQUIRE(result.code == 0);
+  const Json json = Json::parse(result.out);
+  CHECK(json["chapter"] == "01_ray_casting");
+  CHECK(json["triangles"] == 1);
+  CHECK(json["backend"] == "cpu");
+  CHECK(json["output"] == "a.png");
+  CHECK(json["width"] == 64);
+  CHECK(json["height"] == 48);
+  CHECK(json["samples"] == 2);
+  CHECK(json["build_ms"] > 0);
+  CHECK(json["render_ms"] > 0);
+  CHECK(json["mrays_per_s"].get<double>() * json["render_ms"].get<double>() == Approx(2 * 64 * 48 / 1e3).epsilon(1e-6));
+  CHECK(json["bytes"] > 64 * 48 * 16);
+  CHECK(json["features"].is_array());
+  CHECK(json["settings"]["test"] == "watertight");
+  REQUIRE(json["left_out"].size() >= 2);
+  for (const Json& item : json["left_out"])
+    for (const char* key : {"what", "why", "saved_bytes", "saved_ms"}) CHECK_FALSE(item[key].is_null());
+  CHECK(contents(folder / "a.png").substr(1, 3) == "PNG");
+}
+
+// Catches: a result that depends on the working directory, threads or flags that should not matter.
+TEST_CASE("the same picture from any folder, any number of threads, any loop") {
+  Folder folder;
+  const auto image = [&](const std::string& flags) {
+    const Result result = run(folder, "--quiet --backend cpu --scene teapot --size 100x80 --output {}/i.hdr " + flags);
+    INFO(flags << result.err);
+    REQUIRE(result.code == 0);
+    return contents(folder / "i.hdr");
+  };
+  const std::string first = image("--samples 3");
+  CHECK(first.size() > 1000);
+  CHECK(image("--samples 3 --threads 1") == first);
+  CHECK(image("--samples 3 --loop plain") == first);
+  CHECK(image("--samples 3 --no-specialise") == first);
+  CHECK(image("--samples 3 --seed 1") != first);
+  CHECK(image("--samples 4") != first);
+  write(folder / "flags.ini", "samples = 3\nsize = \"100x80\"\ntest = \"watertight\"\n");
+  CHECK(image("--config flags.ini") == first);
+}
+
+// Catches: a valid file without faces refused, or a crash on it.
+TEST_CASE("a scene without faces is an empty image and a warning") {
+  Folder folder;
+  write(folder / "points.obj", "v 0 0 0\nv 1 0 0\n");
+  const Result result = run(folder, "--scene points.obj --size 16x16 --output p.png");
+  CHECK(result.code == 0);
+  CHECK(result.err.find("warning") != std::string::npos);
+  CHECK(fs::exists(folder / "p.png"));
+}
+
+// Catches: Ctrl-C that is ignored, that loses the image, or that takes long to be heeded.
+TEST_CASE("Ctrl-C ends the render soon and keeps the image so far") {
+  Folder folder;
+  const auto start = std::chrono::steady_clock::now();
+  const Result result =
+      run(folder, "--scene teaset --size 4000x4000 --samples 100 --json --backend cpu --output c.png", 2.0);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  INFO(result.err);
+  REQUIRE(result.code == 0);
+  CHECK(seconds < 20);
+  CHECK(Json::parse(result.out)["stopped"] == true);
+  CHECK(contents(folder / "c.png").size() > 1000);
+  CHECK(folder.files() == 1);
+}
+
+// Catches: --time that is not kept.
+TEST_CASE("a time limit adds samples until it has passed") {
+  Folder folder;
+  const Result result = run(folder, "--scene teapot --size 64x48 --time 1.5 --json --output t.png");
+  REQUIRE(result.code == 0);
+  const Json json = Json::parse(result.out);
+  CHECK(json["render_ms"] > 1400);
+  CHECK(json["render_ms"] < 4000);
+  CHECK(json["samples"] > 1);
+}
