@@ -5,7 +5,8 @@
 
 namespace trilha {
 
-/// Input that is refused: exit code 1. The text is one line: file, line where known, what is wrong; what would be right.
+/// Input that is refused: exit code 1. The text is one line: file, line where known, what is wrong; what
+/// would be right.
 struct InputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -12,14 +12,16 @@ constexpr int block_size = 256;
 
 /// One thread an index. The pass is the kernel's name in a profiler.
 template <class Pass>
-__global__ void __launch_bounds__(block_size) pass_kernel(std::size_t begin, std::size_t end, const Pass pass) {
+__global__ void __launch_bounds__(block_size)
+    pass_kernel(std::size_t begin, std::size_t end, const Pass pass) {
   const std::size_t i = begin + static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
   if (i < end) pass(i);
 }
 
 template <class Pass>
 void launch(void* stream, std::size_t begin, std::size_t end, const Pass& pass, std::source_location where) {
-  constexpr std::size_t most = static_cast<std::size_t>(block_size) << 30;  // a grid has at most 2³¹ − 1 blocks
+  constexpr std::size_t most = static_cast<std::size_t>(block_size)
+                               << 30;  // a grid has at most 2³¹ − 1 blocks
   for (std::size_t first = begin; first < end; first += most) {
     const std::size_t last = end - first > most ? first + most : end;
     const auto blocks = static_cast<unsigned>((last - first + block_size - 1) / block_size);

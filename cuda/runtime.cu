@@ -12,7 +12,8 @@ __global__ void nothing() {}
 std::string find_reason() {
   int devices = 0;
   const cudaError_t result = cudaGetDeviceCount(&devices);
-  if (result == cudaErrorInsufficientDriver || result == cudaErrorNoDevice || (result == cudaSuccess && devices == 0))
+  if (result == cudaErrorInsufficientDriver || result == cudaErrorNoDevice ||
+      (result == cudaSuccess && devices == 0))
     return "no CUDA device was found (no NVIDIA GPU, or no driver for one)";
   if (result != cudaSuccess) return std::string("CUDA does not answer: ") + cudaGetErrorString(result);
   cudaFuncAttributes attributes;  // fails where the device is of an architecture that was not compiled for
@@ -84,7 +85,8 @@ double EventPair::milliseconds(void* stream) {
   TRILHA_CHECK(cudaEventRecord(static_cast<cudaEvent_t>(stop_), as_stream(stream)));
   TRILHA_CHECK(cudaEventSynchronize(static_cast<cudaEvent_t>(stop_)));
   float milliseconds = 0;
-  TRILHA_CHECK(cudaEventElapsedTime(&milliseconds, static_cast<cudaEvent_t>(start_), static_cast<cudaEvent_t>(stop_)));
+  TRILHA_CHECK(
+      cudaEventElapsedTime(&milliseconds, static_cast<cudaEvent_t>(start_), static_cast<cudaEvent_t>(stop_)));
   return milliseconds;
 }
 

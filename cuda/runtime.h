@@ -1,5 +1,6 @@
 #pragma once
-// CUDA's runtime behind plain types: what common/parallel/backend.h promises, on the device. Streams are cudaStream_t.
+// CUDA's runtime behind plain types: what common/parallel/backend.h promises, on the device. Streams are
+// cudaStream_t.
 
 #include <cstddef>
 #include <string>

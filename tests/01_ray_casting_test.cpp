@@ -16,8 +16,8 @@ namespace {
 
 template <class Function>
 void with_every_test(const Function& function) {
-  for (const TriangleTest test :
-       {TriangleTest::plane, TriangleTest::moller_trumbore, TriangleTest::baldwin_weber, TriangleTest::watertight})
+  for (const TriangleTest test : {TriangleTest::plane, TriangleTest::moller_trumbore,
+                                  TriangleTest::baldwin_weber, TriangleTest::watertight})
     with_test(test, function);
 }
 
@@ -40,8 +40,9 @@ vec3 in_cube(Random& random) {
   return {x, y, random.uniform(-1, 1)};
 }
 
-/// A triangle and a ray that often meet; `kind` chooses how hard they make it. Only sums, products and square roots:
-/// the same bits on every machine.
+/// A triangle and a ray that often meet; `kind` chooses how hard they make it. Only sums, products and square
+/// roots: the same bits on every machine, as long as no expression draws two random numbers, whose order
+/// would be the compiler's.
 struct Pair {
   vec3 a, b, c;
   Ray ray;
@@ -55,33 +56,36 @@ TRILHA_HD Pair make_pair(Random& random, int kind) {
   Pair p{cube(), cube(), cube(), {}};
   float u = random.uniform(), v = random.uniform();
   if (u + v > 1) u = 1 - u, v = 1 - v;
-  if (kind == 1) p.c = p.a + (p.b - p.a) * random.uniform() + cube() * 1e-7f;  // a sliver, 1e7 times as long as wide
-  if (kind == 2) u = 0;                                                       // at an edge
-  if (kind == 3) u = v = 0;                                                   // at a vertex
+  if (kind == 1) {  // a sliver, 1e7 times as long as wide
+    const vec3 on_edge = p.a + (p.b - p.a) * random.uniform();
+    p.c = on_edge + cube() * 1e-7f;
+  }
+  if (kind == 2) u = 0;      // at an edge
+  if (kind == 3) u = v = 0;  // at a vertex
   vec3 aim = p.a * (1 - u - v) + p.b * u + p.c * v;
   p.ray.origin = cube() * 3.0f;
-  if (kind == 4) p.ray.origin = aim;                                          // starts on the surface
+  if (kind == 4) p.ray.origin = aim;  // starts on the surface
   p.ray.direction = aim - p.ray.origin;
   if (kind == 4) p.ray.direction = cube();
-  if (kind == 5) p.ray.direction = p.b - p.a;                                 // parallel to an edge, grazing
-  if (kind == 6) {                                                            // along an axis
+  if (kind == 5) p.ray.direction = p.b - p.a;  // parallel to an edge, grazing
+  if (kind == 6) {                             // along an axis
     const auto axis = static_cast<int>(random.index(3));
     p.ray.direction = vec3(0);
     p.ray.direction[axis] = random.uniform() < 0.5f ? -1.0f : 1.0f;
     p.ray.origin = aim - p.ray.direction * 2.0f;
   }
-  if (kind == 7) p.b = p.a;                                                   // no area
+  if (kind == 7) p.b = p.a;  // no area
   float scale = 1;
-  if (kind == 8) scale = 0x1p-60f;                                            // 1e-18
-  if (kind == 9) scale = 0x1p60f;                                             // 1e18
+  if (kind == 8) scale = 0x1p-60f;  // 1e-18
+  if (kind == 9) scale = 0x1p60f;   // 1e18
   p.a *= scale, p.b *= scale, p.c *= scale, p.ray.origin *= scale;
-  if (kind == 10) {                                                           // 1e5 sizes from the origin
+  if (kind == 10) {  // 1e5 sizes from the origin
     const vec3 far = {66319.0f, 551.0f, -74843.0f};
     p.a += far, p.b += far, p.c += far, p.ray.origin += far;
   }
-  if (kind == 11) {                                                           // components NaN, infinite, −0, subnormal
-    const float odd[5] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -0.0f,
-                          1e-42f, 3e38f};
+  if (kind == 11) {  // components NaN, infinite, −0, subnormal
+    const float odd[5] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+                          -0.0f, 1e-42f, 3e38f};
     const float value = odd[random.index(5)];
     vec3* vectors[5] = {&p.a, &p.b, &p.c, &p.ray.origin, &p.ray.direction};
     vec3& victim = *vectors[random.index(5)];
@@ -205,7 +209,8 @@ TEST_CASE("each test finds the point it was aimed at, on the right side") {
   });
 }
 
-// Catches: an error bound that does not hold, a test that loses digits, hits and misses that no rounding explains.
+// Catches: an error bound that does not hold, a test that loses digits, hits and misses that no rounding
+// explains.
 TEST_CASE("t stays within the derived bound of the same test in 80-bit arithmetic") {
   with_every_test([](auto test) {
     using Test = decltype(test);
@@ -239,8 +244,9 @@ TEST_CASE("t stays within the derived bound of the same test in 80-bit arithmeti
       ++compared;
       const double error = static_cast<double>(std::fabs(s.t - exact.t));
       if (bound > 0) tightest = std::max(tightest, error / bound);
-      if (!(error <= bound)) FAIL_CHECK(name_of<Test>() << " pair " << i << " kind " << kind << ": t " << s.t << " error "
-                                        << error << " bound " << bound);
+      if (!(error <= bound))
+        FAIL_CHECK(name_of<Test>() << " pair " << i << " kind " << kind << ": t " << s.t << " error " << error
+                                   << " bound " << bound);
     }
     std::printf("  %-16s %zu compared, largest error / bound %.3f, unbounded %zu, hit or miss differs %zu\n",
                 name_of<Test>(), compared, tightest, unbounded, disagreements);
@@ -250,7 +256,8 @@ TEST_CASE("t stays within the derived bound of the same test in 80-bit arithmeti
   });
 }
 
-// Catches: NaN or t outside the interval let through, in particular by comparisons written the wrong way round.
+// Catches: NaN or t outside the interval let through, in particular by comparisons written the wrong way
+// round.
 TEST_CASE("no input, however hostile, makes a hit outside the interval") {
   with_every_test([](auto test) {
     using Test = decltype(test);
@@ -261,8 +268,10 @@ TEST_CASE("no input, however hostile, makes a hit outside the interval") {
       p.ray.t_max = p.ray.t_min + random.uniform(-0.5f, 2);
       Solution<float> s{};
       if (!intersect<Test>(p.a, p.b, p.c, p.ray, s)) continue;
-      const bool good = s.t >= p.ray.t_min && s.t < p.ray.t_max && s.u >= 0 && s.v >= 0 && s.u <= 1 && s.v <= 1;
-      if (!good) FAIL_CHECK(name_of<Test>() << " pair " << i << ": t " << s.t << " u " << s.u << " v " << s.v);
+      const bool good =
+          s.t >= p.ray.t_min && s.t < p.ray.t_max && s.u >= 0 && s.v >= 0 && s.u <= 1 && s.v <= 1;
+      if (!good)
+        FAIL_CHECK(name_of<Test>() << " pair " << i << ": t " << s.t << " u " << s.u << " v " << s.v);
     }
   });
 }
@@ -275,11 +284,12 @@ TEST_CASE("edge functions have the sign of exact arithmetic, down to zero") {
     const auto small = [&] { return static_cast<float>(static_cast<int>(random.index(4097)) - 2048); };
     float a = small(), b = small(), c = small(), d = small();
     if (a == 0) a = 1;
-    if (k % 3 == 0) c = a, d = b;                                  // exactly zero
-    if (k % 3 == 1) c = std::nextafter(a, 1e9f), d = b;            // nearly zero
+    if (k % 3 == 0) c = a, d = b;                        // exactly zero
+    if (k % 3 == 1) c = std::nextafter(a, 1e9f), d = b;  // nearly zero
     const __int128 scale = 1 << 24;
-    const auto exact = static_cast<__int128>(double(a) * double(scale)) * static_cast<__int128>(double(b) * double(scale)) -
-                       static_cast<__int128>(double(c) * double(scale)) * static_cast<__int128>(double(d) * double(scale));
+    const auto exact =
+        static_cast<__int128>(double(a) * double(scale)) * static_cast<__int128>(double(b) * double(scale)) -
+        static_cast<__int128>(double(c) * double(scale)) * static_cast<__int128>(double(d) * double(scale));
     const float value = difference_of_products(a, b, c, d);
     zeros += exact == 0;
     REQUIRE((value > 0) == (exact > 0));
@@ -288,14 +298,15 @@ TEST_CASE("edge functions have the sign of exact arithmetic, down to zero") {
   CHECK(zeros > 300000);
 }
 
-// Catches: any of the three loop orders that skips, repeats or reorders triangles; block ends; mixed ray axes.
+// Catches: any of the three loop orders that skips, repeats or reorders triangles; block ends; mixed ray
+// axes.
 TEST_CASE("plain loop, blocks and tiles give the same hits, bit for bit") {
   const std::vector<Ray> rays = random_rays(effort(3000), 5);
   for (const std::uint32_t count : {0u, 1u, 15u, 16u, 17u, 127u, 128u, 129u, 1000u})
     for (const bool hostile : {false, true}) {
       const Scene scene = scene_of(soup(count, 6, hostile));
-      for (const TriangleTest test :
-           {TriangleTest::plane, TriangleTest::moller_trumbore, TriangleTest::baldwin_weber, TriangleTest::watertight})
+      for (const TriangleTest test : {TriangleTest::plane, TriangleTest::moller_trumbore,
+                                      TriangleTest::baldwin_weber, TriangleTest::watertight})
         for (const bool one_sided : {false, true}) {
           RayCastingSettings settings;
           settings.test = test;
@@ -304,14 +315,16 @@ TEST_CASE("plain loop, blocks and tiles give the same hits, bit for bit") {
           const std::vector<Hit> plain = traced(scene, settings, rays, Backend::cpu);
           settings.loop = Loop::blocked;
           for (const Backend backend : backends()) {
-            INFO(count << " triangles, hostile " << hostile << ", test " << int(test) << " on " << name(backend));
+            INFO(count << " triangles, hostile " << hostile << ", test " << int(test) << " on "
+                       << name(backend));
             CHECK(differences(plain, traced(scene, settings, rays, backend)) == 0);
           }
         }
     }
 }
 
-// Catches: a closest hit that is not the closest, ties that go to the wrong triangle, one-sided hits from behind.
+// Catches: a closest hit that is not the closest, ties that go to the wrong triangle, one-sided hits from
+// behind.
 TEST_CASE("the hit is the nearest of all, the first of equals") {
   const Mesh mesh = soup(300, 7, false);
   Mesh twice = mesh;  // every triangle again: each hit is a tie
@@ -364,10 +377,11 @@ TEST_CASE("the watertight test misses nothing from inside closed meshes, and kee
     const char* name;
     double size, offset;
   };
-  const Case cases[] = {{"size 1e-18", 1e-18, 0}, {"size 1e-9", 1e-9, 0},   {"size 1", 1, 0},
-                        {"size 1e9", 1e9, 0},     {"size 1e18", 1e18, 0},   {"1e3 sizes away", 1, 1e3},
-                        {"1e5 sizes away", 1, 1e5}, {"1e-18, 1e5 away", 1e-18, 1e5}, {"1e18, 1e5 away", 1e18, 1e5},
-                        {"1e7 sizes away", 1, 1e7}};
+  const Case cases[] = {
+      {"size 1e-18", 1e-18, 0},   {"size 1e-9", 1e-9, 0},          {"size 1", 1, 0},
+      {"size 1e9", 1e9, 0},       {"size 1e18", 1e18, 0},          {"1e3 sizes away", 1, 1e3},
+      {"1e5 sizes away", 1, 1e5}, {"1e-18, 1e5 away", 1e-18, 1e5}, {"1e18, 1e5 away", 1e18, 1e5},
+      {"1e7 sizes away", 1, 1e7}};
   const std::pair<const char*, std::function<Mesh(double, dvec3)>> meshes[] = {
       {"20", [](double s, dvec3 c) { return icosphere(0, s, c); }},
       {"320", [](double s, dvec3 c) { return icosphere(2, s, c); }},
@@ -379,7 +393,8 @@ TEST_CASE("the watertight test misses nothing from inside closed meshes, and kee
     const Stream stream(backend);
     if (factor > 10 && backend == Backend::cpu) continue;  // 10⁹ rays are for the device
     const std::uint64_t wanted = 8500 * factor;  // 10 cases × 4 meshes × 3 aims: 10⁶ rays in all
-    std::printf("  %s: misses / beyond the bound, of %llu rays a cell\n", name(backend), (unsigned long long)wanted);
+    std::printf("  %s: misses / beyond the bound, of %llu rays a cell\n", name(backend),
+                (unsigned long long)wanted);
     WatertightCounts total;
     std::uint64_t others[3] = {};
     for (const Case& c : cases) {
@@ -413,17 +428,20 @@ TEST_CASE("the watertight test misses nothing from inside closed meshes, and kee
               CHECK(counts.misses == 0);
               CHECK(counts.beyond_bound == 0);
             } else {
-              row_others[other++] += (counts.misses + counts.wrong) * 10000000 / std::max<std::uint64_t>(counts.rays, 1) / 12;
+              row_others[other++] +=
+                  (counts.misses + counts.wrong) * 10000000 / std::max<std::uint64_t>(counts.rays, 1) / 12;
             }
           });
         }
       }
-      std::printf("    %-16s %10llu rays: watertight %llu misses, %llu beyond, %llu unbounded; missed or t off by 1 %% in 10^7: plane "
-                  "%llu, Moller-Trumbore %llu, Baldwin-Weber %llu\n",
-                  c.name, (unsigned long long)row.rays, (unsigned long long)row.misses,
-                  (unsigned long long)row.beyond_bound, (unsigned long long)row.unbounded,
-                  (unsigned long long)row_others[0], (unsigned long long)row_others[1],
-                  (unsigned long long)row_others[2]);
+      std::printf(
+          "    %-16s %10llu rays: watertight %llu misses, %llu beyond, %llu unbounded; missed or t off by 1 "
+          "%% in 10^7: plane "
+          "%llu, Moller-Trumbore %llu, Baldwin-Weber %llu\n",
+          c.name, (unsigned long long)row.rays, (unsigned long long)row.misses,
+          (unsigned long long)row.beyond_bound, (unsigned long long)row.unbounded,
+          (unsigned long long)row_others[0], (unsigned long long)row_others[1],
+          (unsigned long long)row_others[2]);
       total.rays += row.rays, total.unbounded += row.unbounded;
       for (int k = 0; k < 3; ++k) others[k] += row_others[k];
     }
@@ -433,7 +451,7 @@ TEST_CASE("the watertight test misses nothing from inside closed meshes, and kee
 }
 
 // Catches: any operation that rounds differently on the two machines.
-TEST_CASE("t, u and v are the same bits on CPU and CUDA") {
+TEST_CASE("random and extreme pairs give the same bits on CPU and CUDA") {
   require_cuda();
   const std::size_t chunk = std::size_t{pair_kinds} << 18, chunks = std::max<std::size_t>(1, effort(1));
   with_every_test([&](auto test) {
@@ -449,10 +467,33 @@ TEST_CASE("t, u and v are the same bits on CPU and CUDA") {
         hits += there[i].hit;
       }
     }
-    std::printf("  %-16s %zu pairs, %zu hits, %zu different\n", name_of<Test>(), chunk * chunks, hits, different);
+    std::printf("  %-16s %zu pairs, %zu hits, %zu different\n", name_of<Test>(), chunk * chunks, hits,
+                different);
     CHECK(different == 0);
     CHECK(hits > chunk * chunks / 5);
   });
+}
+
+// Catches: a difference that only a real model brings out.
+TEST_CASE("every pixel's hit is the same on CPU and CUDA") {
+  require_cuda();
+  const Scene scene = load_scene("");  // the bunny where it has been fetched
+  const Tiling tiling{640, 480};
+  std::vector<Ray> rays(tiling.size());
+  for_each(Backend::cpu, tiling.size(),
+           PrimaryRays{PinholeCamera::make(scene.camera, 640, 480), tiling, 0, 0, 0, false, rays.data()});
+  for (const TriangleTest test : {TriangleTest::plane, TriangleTest::moller_trumbore,
+                                  TriangleTest::baldwin_weber, TriangleTest::watertight}) {
+    RayCastingSettings settings;
+    settings.test = test;
+    const std::vector<Hit> cpu = traced(scene, settings, rays, Backend::cpu);
+    const auto hits = std::count_if(cpu.begin(), cpu.end(), [](const Hit& hit) { return hit.found(); });
+    const std::size_t different = differences(cpu, traced(scene, settings, rays, Backend::cuda));
+    std::printf("  %s, test %d: %zu rays, %td hits, %zu different\n", scene.name.c_str(), int(test),
+                rays.size(), hits, different);
+    CHECK(different == 0);
+    CHECK(hits > 50000);
+  }
 }
 
 // Catches: a pass that is not the same on both machines, from the camera to the film.
@@ -494,7 +535,8 @@ TEST_CASE("the pinhole camera maps pixels to directions as geometry says") {
   CHECK(glm::length(middle - vec3(0, 0, -1)) < 1e-6f);
   const vec3 upper_left = pinhole.ray(0, 0).direction;  // half height 1 at distance 1, twice as wide
   CHECK(glm::length(upper_left - glm::normalize(vec3(-2, 1, -1))) < 1e-6f);
-  for (float x = 0; x <= 1; x += 0.125f) CHECK(glm::length(pinhole.ray(x, 0.3f).direction) == Approx(1).margin(1e-6));
+  for (float x = 0; x <= 1; x += 0.125f)
+    CHECK(glm::length(pinhole.ray(x, 0.3f).direction) == Approx(1).margin(1e-6));
   camera.up = {0, 0, 1};
   CHECK_THROWS_AS(PinholeCamera::make(camera, 200, 100), InputError);
   camera.up = {0, 1, 0};
@@ -502,7 +544,8 @@ TEST_CASE("the pinhole camera maps pixels to directions as geometry says") {
   CHECK_THROWS_AS(PinholeCamera::make(camera, 200, 100), InputError);
 }
 
-// Catches: normals that are not the surface's, a cosine that is not the light's, interpolation with wrong weights.
+// Catches: normals that are not the surface's, a cosine that is not the light's, interpolation with wrong
+// weights.
 TEST_CASE("shading of a sphere agrees with the sphere") {
   Scene scene = scene_of(icosphere(5));
   scene.materials[0].diffuse = vec3(1);

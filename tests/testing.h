@@ -17,8 +17,8 @@ namespace trilha::testing {
 /// Ends the test case as skipped, never as passed, where there is no CUDA device.
 void require_cuda();
 
-/// The backends that exist here: for checks that hold on each machine. Skips nothing: a case about CUDA alone calls
-/// require_cuda.
+/// The backends that exist here: for checks that hold on each machine. Skips nothing: a case about CUDA alone
+/// calls require_cuda.
 std::vector<Backend> backends();
 
 }  // namespace trilha::testing

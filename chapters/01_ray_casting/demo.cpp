@@ -14,17 +14,19 @@ class RayCastingDemo final : public Demo {
 
   void declare_settings(Settings& settings) override {
     declared_ = &settings;
-    settings.choice("test", settings_.test,
-                    {{int(TriangleTest::plane), "plane", "plane, then barycentrics (Ordeix & Cioli 2010); 36 bytes"},
-                     {int(TriangleTest::moller_trumbore), "moller-trumbore", "Cramer's rule (1997); 36 bytes"},
-                     {int(TriangleTest::baldwin_weber), "baldwin-weber", "precomputed map (2016); 48 bytes"},
-                     {int(TriangleTest::watertight), "watertight",
-                      "sheared edge functions of exact sign (Woop et al. 2013); 36 bytes"}},
-                    Effect::rebuild, "the ray-triangle test");
-    settings.choice("loop", settings_.loop,
-                    {{int(Loop::plain), "plain", "one triangle after the other, as the lesson has it"},
-                     {int(Loop::blocked), "blocked", "CPU: 16 triangles at once; CUDA: tiles in shared memory"}},
-                    Effect::rebuild, "the order in which rays meet triangles; the hits are the same");
+    settings.choice(
+        "test", settings_.test,
+        {{int(TriangleTest::plane), "plane", "plane, then barycentrics (Ordeix & Cioli 2010); 36 bytes"},
+         {int(TriangleTest::moller_trumbore), "moller-trumbore", "Cramer's rule (1997); 36 bytes"},
+         {int(TriangleTest::baldwin_weber), "baldwin-weber", "precomputed map (2016); 48 bytes"},
+         {int(TriangleTest::watertight), "watertight",
+          "sheared edge functions of exact sign (Woop et al. 2013); 36 bytes"}},
+        Effect::rebuild, "the ray-triangle test");
+    settings.choice(
+        "loop", settings_.loop,
+        {{int(Loop::plain), "plain", "one triangle after the other, as the lesson has it"},
+         {int(Loop::blocked), "blocked", "CPU: 16 triangles at once; CUDA: tiles in shared memory"}},
+        Effect::rebuild, "the order in which rays meet triangles; the hits are the same");
     settings.choice("shading", settings_.shading,
                     {{int(Shading::lambert), "lambert", "diffuse colour under a light at the eye"},
                      {int(Shading::normals), "normals", "x, y, z of the normal as red, green, blue"},
@@ -52,8 +54,8 @@ class RayCastingDemo final : public Demo {
     caster_->set_one_sided(settings_.one_sided);
     const double pixels = double(film.tiling().width) * film.tiling().height;
     double done = 0;
-    const bool finished = caster_->add_sample(film, request.camera, request.index, request.jittered, request.seed,
-                                              [&](double fraction) {
+    const bool finished = caster_->add_sample(film, request.camera, request.index, request.jittered,
+                                              request.seed, [&](double fraction) {
                                                 done = fraction;
                                                 return request.keep_going(fraction);
                                               });
@@ -85,19 +87,23 @@ class RayCastingDemo final : public Demo {
     const std::string shading = "shading " + (*declared_)["shading"].text();
     std::vector<Omission> list;
     const auto omit = [&](bool Keep::*part, const std::string& what, const std::string& why) {
-      list.push_back({what, why, {"build", "shade"}, [this, part](bool keep) { settings_.keep.*part = keep; }});
+      list.push_back(
+          {what, why, {"build", "shade"}, [this, part](bool keep) { settings_.keep.*part = keep; }});
     };
-    if (!reads_surface(settings_)) omit(&Keep::surface, "positions and vertex numbers", shading + " reads only the hit");
+    if (!reads_surface(settings_))
+      omit(&Keep::surface, "positions and vertex numbers", shading + " reads only the hit");
     if (!reads_normals(settings_))
       omit(&Keep::normals, "vertex normals",
-           settings_.smooth ? shading + " reads none" : "normals are flat, one a triangle (--smooth reads them)");
+           settings_.smooth ? shading + " reads none"
+                            : "normals are flat, one a triangle (--smooth reads them)");
     if (scene_->features.texture_coordinates)
       omit(&Keep::texture_coordinates, "texture coordinates", "this chapter has no textures");
     if (settings_.shading != Shading::lambert)
       omit(&Keep::materials, "materials", shading + " shows no colours of the scene");
     else if (!scene_->features.materials)
       omit(&Keep::materials, "a material a triangle", "all triangles have the same");
-    omit(&Keep::general_kernel, "the general shading kernel", "one compiled for what " + shading + " reads runs instead");
+    omit(&Keep::general_kernel, "the general shading kernel",
+         "one compiled for what " + shading + " reads runs instead");
     return list;
   }
 

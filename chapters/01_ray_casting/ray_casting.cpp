@@ -24,7 +24,8 @@ PinholeCamera PinholeCamera::make(const Camera& camera, int width, int height) {
                      " degrees; it has to be between 0 and 180");
   const dvec3 forward = view / distance;
   const dvec3 right = glm::cross(forward, dvec3(camera.up) / glm::length(dvec3(camera.up)));
-  if (!(glm::length(right) > 1e-6)) throw InputError("the camera's up vector points along its view; turn one of them");
+  if (!(glm::length(right) > 1e-6))
+    throw InputError("the camera's up vector points along its view; turn one of them");
   const double half_height = std::tan(glm::radians(static_cast<double>(camera.field_of_view)) / 2);
   const double half_width = half_height * width / height;
   const dvec3 unit_right = glm::normalize(right);
@@ -32,7 +33,8 @@ PinholeCamera PinholeCamera::make(const Camera& camera, int width, int height) {
           vec3(glm::cross(forward, unit_right) * half_height)};
 }
 
-// ---- shading --------------------------------------------------------------------------------------------------------
+// ---- shading
+// --------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -70,7 +72,7 @@ TRILHA_HD T interpolated(const T* values, const uvec3& triangle, const Hit& hit)
 template <Reads reads>
 TRILHA_HD vec3 Shade<reads>::colour(const Ray& ray, const Hit& hit) const {
   if (shading == Shading::tests) return vec3(static_cast<float>(tested));
-  if (!hit.found()) return vec3(0);
+  if (!hit.found()) return shading == Shading::lambert ? vec3(0.015f, 0.02f, 0.03f) : vec3(0);
   vec3 normal(0), geometric(0);
   if constexpr (reads != Reads::hit_alone) {
     const uvec3 t = surface.triangles[hit.primitive];
@@ -82,31 +84,39 @@ TRILHA_HD vec3 Shade<reads>::colour(const Ray& ray, const Hit& hit) const {
     }
     if (reads == Reads::everything && surface.texture_coordinates != nullptr) {
       const vec2 uv = interpolated(surface.texture_coordinates, t, hit);
-      if (uv.x != uv.x) return vec3(1, 0, 1);  // keeps the compiler from dropping what this kernel is there to show
+      if (uv.x != uv.x)
+        return vec3(1, 0, 1);  // keeps the compiler from dropping what this kernel is there to show
     }
   }
   const bool front = fused_dot(geometric, ray.direction) < 0;
   switch (shading) {
     case Shading::lambert: {
-      const vec3 diffuse = surface.diffuse[surface.materials != nullptr ? surface.materials[hit.primitive] : 0];
+      const vec3 diffuse =
+          surface.diffuse[surface.materials != nullptr ? surface.materials[hit.primitive] : 0];
       return diffuse * std::fabs(fused_dot(normal, ray.direction));
     }
-    case Shading::normals: return normal * 0.5f + vec3(0.5f);
+    case Shading::normals:
+      return normal * 0.5f + vec3(0.5f);
     case Shading::depth: {
       const float depth = (hit.t - depth_near) / (depth_far - depth_near);
       return vec3(1.0f - 0.9f * min(max(depth, 0.0f), 1.0f));
     }
-    case Shading::primitive: return colour_of(hit.primitive);
-    case Shading::barycentrics: return {1 - hit.u - hit.v, hit.u, hit.v};
-    case Shading::facing: return front ? vec3(0.2f, 0.45f, 0.7f) : vec3(0.9f, 0.6f, 0.0f);
-    case Shading::tests: break;
+    case Shading::primitive:
+      return colour_of(hit.primitive);
+    case Shading::barycentrics:
+      return {1 - hit.u - hit.v, hit.u, hit.v};
+    case Shading::facing:
+      return front ? vec3(0.2f, 0.45f, 0.7f) : vec3(0.9f, 0.6f, 0.0f);
+    case Shading::tests:
+      break;
   }
   return vec3(0);
 }
 
 namespace {
 
-// ---- building -------------------------------------------------------------------------------------------------------
+// ---- building
+// -------------------------------------------------------------------------------------------------------
 
 /// All meshes of a scene as one, with only those parts that are asked for.
 struct Parts {
@@ -152,7 +162,8 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
   if (!settings.specialise) settings_.keep = {true, true, true, true, true};
   const Keep& keep = settings_.keep;
   const bool diffuse_needed = keep.materials || settings.shading == Shading::lambert;
-  const Parts parts{reads_normals(settings) || keep.normals, keep.texture_coordinates && scene.features.texture_coordinates,
+  const Parts parts{reads_normals(settings) || keep.normals,
+                    keep.texture_coordinates && scene.features.texture_coordinates,
                     diffuse_needed && scene.features.materials};
   const Mesh mesh = united_mesh(scene, parts);
   positions_ = Buffer(stream_, mesh.positions);
@@ -181,7 +192,8 @@ void RayCaster::prepare() {
            PrepareTriangles<Test>{positions_.data(), triangles_.data(), count_, lanes, numbers_.data()});
 }
 
-// ---- rendering ------------------------------------------------------------------------------------------------------
+// ---- rendering
+// ------------------------------------------------------------------------------------------------------
 
 void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
   with_test(settings_.test, [&](auto test) {
@@ -199,8 +211,8 @@ void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
   });
 }
 
-bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sample, bool jittered, std::uint64_t seed,
-                           const std::function<bool(double)>& keep_going) {
+bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sample, bool jittered,
+                           std::uint64_t seed, const std::function<bool(double)>& keep_going) {
   const Tiling& tiling = film.tiling();
   const PinholeCamera pinhole =
       PinholeCamera::make(camera, static_cast<int>(tiling.width), static_cast<int>(tiling.height));
@@ -252,8 +264,8 @@ void RayCaster::shade(std::size_t begin, std::size_t end, Film& film, const Came
   const double distance = glm::length(dvec3(bounds_.centre()) - dvec3(camera.eye));
   for_each(stream_, {begin, end},
            Shade<reads>{film.tiling(), begin, rays_.data(), hits_.data(), surface, settings_.shading, count_,
-                        static_cast<float>(std::max(distance - radius, 0.0)), static_cast<float>(distance + radius),
-                        film.pixels()});
+                        static_cast<float>(std::max(distance - radius, 0.0)),
+                        static_cast<float>(distance + radius), film.pixels()});
 }
 
 }  // namespace trilha

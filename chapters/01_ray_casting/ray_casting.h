@@ -1,8 +1,8 @@
 #pragma once
-// Ray casting (Appel 1968): for every pixel one ray from the eye, the nearest surface along it by asking every
-// triangle, and a colour from what was hit. Read from top to bottom: camera, structure, passes, and the caster that
-// runs them. ray_casting.cpp builds and renders; triangle_blocks and triangle_tiles are the same loop in the order
-// that a CPU's vectors and a GPU's shared memory want.
+// Ray casting (Appel 1968): for every pixel one ray from the eye, the nearest surface along it by asking
+// every triangle, and a colour from what was hit. Read from top to bottom: camera, structure, passes, and the
+// caster that runs them. ray_casting.cpp builds and renders; triangle_blocks and triangle_tiles are the same
+// loop in the order that a CPU's vectors and a GPU's shared memory want.
 
 #include <functional>
 
@@ -14,20 +14,23 @@
 
 namespace trilha {
 
-// ---- the camera -----------------------------------------------------------------------------------------------------
+// ---- the camera
+// -----------------------------------------------------------------------------------------------------
 
 /// A pinhole: every ray starts at the eye and goes through a point of the image plane at distance one.
 struct PinholeCamera {
   vec3 eye, forward;
   vec3 right, down;  ///< from the middle of the image plane to its right and lower edge
 
-  /// Throws InputError if the eye is at the target, `up` points along the view, or the field of view is outside (0, 180).
+  /// Throws InputError if the eye is at the target, `up` points along the view, or the field of view is
+  /// outside (0, 180).
   static PinholeCamera make(const Camera& camera, int width, int height);
 
   /// The ray through the image plane at x, y in [0, 1]², from the upper left; its direction has length one.
   TRILHA_HD Ray ray(float x, float y) const {
     const float sx = fma(2.0f, x, -1.0f), sy = fma(2.0f, y, -1.0f);
-    const vec3 d = {fma(sx, right.x, fma(sy, down.x, forward.x)), fma(sx, right.y, fma(sy, down.y, forward.y)),
+    const vec3 d = {fma(sx, right.x, fma(sy, down.x, forward.x)),
+                    fma(sx, right.y, fma(sy, down.y, forward.y)),
                     fma(sx, right.z, fma(sy, down.z, forward.z))};
     Ray ray;
     ray.origin = eye;
@@ -36,7 +39,8 @@ struct PinholeCamera {
   }
 };
 
-// ---- the structure: no structure at all ----------------------------------------------------------------------------
+// ---- the structure: no structure at all
+// ----------------------------------------------------------------------------
 
 /// Triangles as primitives: `count` of them, with Test::numbers numbers each, one triangle after the other.
 template <class Test_>
@@ -98,19 +102,21 @@ struct BruteForce {
   }
 };
 
-// ---- settings -------------------------------------------------------------------------------------------------------
+// ---- settings
+// -------------------------------------------------------------------------------------------------------
 
 enum class TriangleTest { plane, moller_trumbore, baldwin_weber, watertight };
 enum class Loop { plain, blocked };
 enum class Shading { lambert, normals, depth, primitive, barycentrics, facing, tests };
 
-/// What is built or run although the scene and the shading do not need it: to measure what leaving it out saves.
+/// What is built or run although the scene and the shading do not need it: to measure what leaving it out
+/// saves.
 struct Keep {
-  bool surface = false;              ///< positions and vertex numbers, after the triangles are prepared
+  bool surface = false;  ///< positions and vertex numbers, after the triangles are prepared
   bool normals = false;
   bool texture_coordinates = false;
   bool materials = false;
-  bool general_kernel = false;       ///< the shading kernel that decides at run time what it reads
+  bool general_kernel = false;  ///< the shading kernel that decides at run time what it reads
 };
 
 struct RayCastingSettings {
@@ -135,18 +141,24 @@ inline bool reads_normals(const RayCastingSettings& s) {
 template <class Function>
 decltype(auto) with_test(TriangleTest test, const Function& function) {
   switch (test) {
-    case TriangleTest::plane: return function(PlaneBarycentric{});
-    case TriangleTest::moller_trumbore: return function(MollerTrumbore{});
-    case TriangleTest::baldwin_weber: return function(BaldwinWeber{});
-    case TriangleTest::watertight: break;
+    case TriangleTest::plane:
+      return function(PlaneBarycentric{});
+    case TriangleTest::moller_trumbore:
+      return function(MollerTrumbore{});
+    case TriangleTest::baldwin_weber:
+      return function(BaldwinWeber{});
+    case TriangleTest::watertight:
+      break;
   }
   return function(Watertight{});
 }
 
-// ---- the passes -----------------------------------------------------------------------------------------------------
+// ---- the passes
+// -----------------------------------------------------------------------------------------------------
 
-/// Triangle i → the numbers that the test keeps of it, in groups of `lanes` triangles: number k of a group's triangles
-/// lies together. One lane is one triangle after the other. The last group is filled up with the last triangle.
+/// Triangle i → the numbers that the test keeps of it, in groups of `lanes` triangles: number k of a group's
+/// triangles lies together. One lane is one triangle after the other. The last group is filled up with the
+/// last triangle.
 template <class Test>
 struct PrepareTriangles {
   const vec3* positions;
@@ -163,13 +175,14 @@ struct PrepareTriangles {
   }
 };
 
-/// Pixel → ray. The first sample of a pixel that gets no other goes through its centre, others anywhere in it.
+/// Pixel → ray. The first sample of a pixel that gets no other goes through its centre, others anywhere in
+/// it.
 struct PrimaryRays {
   PinholeCamera camera;
   Tiling tiling;
-  std::size_t first;      ///< the band's first index; rays[0] is its ray
+  std::size_t first;  ///< the band's first index; rays[0] is its ray
   std::uint64_t seed;
-  std::uint32_t sample;   ///< which of the pixel's samples, from 0
+  std::uint32_t sample;  ///< which of the pixel's samples, from 0
   bool jittered;
   Ray* rays;
 
@@ -215,8 +228,8 @@ struct SurfaceView {
 /// How much of the surface a shading mode reads. `everything` is the kernel of --no-specialise.
 enum class Reads { hit_alone, flat_normal, smooth_normal, everything };
 
-/// Hit → colour, added to the film. A head light shines from the eye along every ray, so Lambert's law is the cosine
-/// between ray and normal times the diffuse colour.
+/// Hit → colour, added to the film. A head light shines from the eye along every ray, so Lambert's law is the
+/// cosine between ray and normal times the diffuse colour.
 template <Reads reads>
 struct Shade {
   Tiling tiling;
@@ -240,7 +253,8 @@ struct Shade {
   TRILHA_HD vec3 colour(const Ray& ray, const Hit& hit) const;
 };
 
-// ---- the caster -----------------------------------------------------------------------------------------------------
+// ---- the caster
+// -----------------------------------------------------------------------------------------------------
 
 /// Milliseconds of each stage, summed over the samples.
 struct StageTimes {
@@ -253,7 +267,8 @@ class RayCaster {
   /// Throws InputError for a scene of more than 2³² − 2 triangles, DeviceError if the backend is missing.
   RayCaster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream);
 
-  /// Adds one sample to every pixel. keep_going(fraction) is asked after each band. Returns false if stopped early.
+  /// Adds one sample to every pixel. keep_going(fraction) is asked after each band. Returns false if stopped
+  /// early.
   bool add_sample(Film& film, const Camera& camera, std::uint32_t sample, bool jittered, std::uint64_t seed,
                   const std::function<bool(double)>& keep_going);
 

@@ -2,11 +2,12 @@
 // Four ways to ask where a ray meets a triangle. Each test is a struct with the same three steps:
 //
 //   prepare    what is kept of a triangle, made once: `numbers` numbers
-//   measure    straight-line arithmetic, no branch, no decision; whole blocks of triangles go through it as vectors
-//   solve      for the few that may_hit lets pass: the decision, the divisions, t and the barycentrics
+//   measure    straight-line arithmetic, no branch, no decision; whole blocks of triangles go through it as
+//   vectors solve      for the few that may_hit lets pass: the decision, the divisions, t and the
+//   barycentrics
 //
-// and each is templated on its scalar, so that the reference in higher precision is the same code. All tests are
-// two-sided and say which side was hit. Barycentric u belongs to vertex b and v to vertex c.
+// and each is templated on its scalar, so that the reference in higher precision is the same code. All tests
+// are two-sided and say which side was hit. Barycentric u belongs to vertex b and v to vertex c.
 
 #include "common/math/precision.h"
 #include "common/math/ray.h"
@@ -23,7 +24,8 @@ struct Numbers {
   TRILHA_HD Vec3<T> vector(int k) const { return {(*this)[k], (*this)[k + 1], (*this)[k + 2]}; }
 };
 
-/// What a test found: the ray meets the triangle at t, barycentrics u and v, on the front (counter-clockwise) or back.
+/// What a test found: the ray meets the triangle at t, barycentrics u and v, on the front (counter-clockwise)
+/// or back.
 template <class T>
 struct Solution {
   T t, u, v;
@@ -55,9 +57,9 @@ struct KeepsVertices {
   }
 };
 
-/// The plane first, then a change of coordinates: the point where the ray meets the plane, expressed in the triangle's
-/// edges by their inner products. The first test of Ordeix & Cioli 2010, after Akenine-Möller & Haines 2002 (§13.7).
-/// Products of four lengths: leaves float's range for triangles beyond 1e±9.
+/// The plane first, then a change of coordinates: the point where the ray meets the plane, expressed in the
+/// triangle's edges by their inner products. The first test of Ordeix & Cioli 2010, after Akenine-Möller &
+/// Haines 2002 (§13.7). Products of four lengths: leaves float's range for triangles beyond 1e±9.
 struct PlaneBarycentric : KeepsVertices {
   template <class T>
   TRILHA_HD static NoRayConstants constants(const RayOf<T>&) {
@@ -137,9 +139,10 @@ struct MollerTrumbore : KeepsVertices {
   }
 };
 
-/// Baldwin & Weber 2016 (JCGT 5:3): the affine map that takes the triangle to (0,0,0), (1,0,0), (0,1,0) is made once,
-/// in double, and kept as three rows of four numbers; a ray needs it only where it crosses the third row's plane. The
-/// map's free direction is the axis nearest to the normal, with the normal's sign, so that the third row keeps it.
+/// Baldwin & Weber 2016 (JCGT 5:3): the affine map that takes the triangle to (0,0,0), (1,0,0), (0,1,0) is
+/// made once, in double, and kept as three rows of four numbers; a ray needs it only where it crosses the
+/// third row's plane. The map's free direction is the axis nearest to the normal, with the normal's sign, so
+/// that the third row keeps it.
 struct BaldwinWeber {
   static constexpr int numbers = 12;
 
@@ -147,13 +150,15 @@ struct BaldwinWeber {
   TRILHA_HD static void prepare(const Vec3<T>& a, const Vec3<T>& b, const Vec3<T>& c, T* out) {
     using W = Wider<T>;
     const Vec3<W> origin(a), e1 = Vec3<W>(b) - origin, e2 = Vec3<W>(c) - origin;
-    const Vec3<W> n = {difference_of_products(e1.y, e2.z, e1.z, e2.y), difference_of_products(e1.z, e2.x, e1.x, e2.z),
+    const Vec3<W> n = {difference_of_products(e1.y, e2.z, e1.z, e2.y),
+                       difference_of_products(e1.z, e2.x, e1.x, e2.z),
                        difference_of_products(e1.x, e2.y, e1.y, e2.x)};
     const Vec3<W> size = {std::fabs(n.x), std::fabs(n.y), std::fabs(n.z)};
     const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
     Vec3<W> free(0);
     free[axis] = n[axis] < 0 ? W(-1) : W(1);
-    const Vec3<W> rows[3] = {fused_cross(e2, free) / size[axis], fused_cross(free, e1) / size[axis], n / size[axis]};
+    const Vec3<W> rows[3] = {fused_cross(e2, free) / size[axis], fused_cross(free, e1) / size[axis],
+                             n / size[axis]};
     for (int r = 0; r < 3; ++r) {
       for (int k = 0; k < 3; ++k) out[4 * r + k] = static_cast<T>(rows[r][k]);
       out[4 * r + 3] = static_cast<T>(-fused_dot(rows[r], origin));
@@ -200,11 +205,12 @@ struct BaldwinWeber {
   }
 };
 
-/// Woop, Benthin & Wald 2013 (JCGT 2:1), watertight: space is moved to the ray's origin and sheared so that the ray
-/// becomes the z axis; then three signs in the plane decide. A vertex is sheared alike for all triangles that share it,
-/// and each edge function is a difference of products with the exact sign, so neighbours agree on every ray that
-/// touches their edge or vertex, and no ray slips between them. Where an edge function is zero, subnormal or not
-/// finite, float cannot vouch for the sign, and all three are taken again in double, where the products are exact.
+/// Woop, Benthin & Wald 2013 (JCGT 2:1), watertight: space is moved to the ray's origin and sheared so that
+/// the ray becomes the z axis; then three signs in the plane decide. A vertex is sheared alike for all
+/// triangles that share it, and each edge function is a difference of products with the exact sign, so
+/// neighbours agree on every ray that touches their edge or vertex, and no ray slips between them. Where an
+/// edge function is zero, subnormal or not finite, float cannot vouch for the sign, and all three are taken
+/// again in double, where the products are exact.
 struct Watertight : KeepsVertices {
   template <class T>
   struct Constants {
@@ -230,8 +236,9 @@ struct Watertight : KeepsVertices {
 
   template <class T>
   TRILHA_HD static Measure<T> measure(Numbers<T> triangle, const RayOf<T>&, const Constants<T>& k) {
-    return measure_turned(triangle[k.kx], triangle[k.ky], triangle[k.kz], triangle[3 + k.kx], triangle[3 + k.ky],
-                          triangle[3 + k.kz], triangle[6 + k.kx], triangle[6 + k.ky], triangle[6 + k.kz], k);
+    return measure_turned(triangle[k.kx], triangle[k.ky], triangle[k.kz], triangle[3 + k.kx],
+                          triangle[3 + k.ky], triangle[3 + k.kz], triangle[6 + k.kx], triangle[6 + k.ky],
+                          triangle[6 + k.kz], k);
   }
 
   /// The same for coordinates already in the order kx, ky, kz.
@@ -249,8 +256,8 @@ struct Watertight : KeepsVertices {
     return m;
   }
 
-  /// False only if one sign is surely positive and another surely negative. Where an edge function is NaN, machines may
-  /// answer differently; `solve` then finds the same.
+  /// False only if one sign is surely positive and another surely negative. Where an edge function is NaN,
+  /// machines may answer differently; `solve` then finds the same.
   template <class T>
   TRILHA_HD static bool may_hit(const Measure<T>& m) {
     constexpr T sure = std::numeric_limits<T>::min();
@@ -259,7 +266,8 @@ struct Watertight : KeepsVertices {
   }
 
   template <class T>
-  TRILHA_HD static bool solve(const Measure<T>& m, const RayOf<T>& ray, const Constants<T>& k, Solution<T>& s) {
+  TRILHA_HD static bool solve(const Measure<T>& m, const RayOf<T>& ray, const Constants<T>& k,
+                              Solution<T>& s) {
     const T det = m.u + m.v + m.w;
     if (is_normal(m.u) && is_normal(m.v) && is_normal(m.w) && is_normal(det))
       return finish(m, m.u, m.v, m.w, det, ray.direction[k.kz], s);
@@ -282,9 +290,11 @@ struct Watertight : KeepsVertices {
   }
 };
 
-/// The whole test of one triangle: true, and the solution, if the ray meets it at t in [ray.t_min, ray.t_max).
+/// The whole test of one triangle: true, and the solution, if the ray meets it at t in [ray.t_min,
+/// ray.t_max).
 template <class Test, class T, class Constants>
-TRILHA_HD inline bool intersect(Numbers<T> triangle, const RayOf<T>& ray, const Constants& constants, Solution<T>& s) {
+TRILHA_HD inline bool intersect(Numbers<T> triangle, const RayOf<T>& ray, const Constants& constants,
+                                Solution<T>& s) {
   const auto m = Test::measure(triangle, ray, constants);
   return Test::may_hit(m) && Test::solve(m, ray, constants, s) && s.t >= ray.t_min && s.t < ray.t_max;
 }

@@ -8,11 +8,11 @@
 namespace trilha {
 namespace {
 
-constexpr std::size_t batch = 256;            // rays that share a chunk
+constexpr std::size_t batch = 256;             // rays that share a chunk
 constexpr std::size_t chunk_bytes = 16 << 10;  // half of a first-level cache
 
-/// Tests one ray against one block. Measuring is a loop without a branch, which the compiler turns into vectors; the
-/// few lanes that pass are settled one by one, by the code of the plain loop.
+/// Tests one ray against one block. Measuring is a loop without a branch, which the compiler turns into
+/// vectors; the few lanes that pass are settled one by one, by the code of the plain loop.
 template <class Test, class Constants>
 inline void test_block(const Triangles<Test>& triangles, std::uint32_t block, const Ray& ray,
                        const Constants& constants, Hit& hit) {
@@ -20,7 +20,8 @@ inline void test_block(const Triangles<Test>& triangles, std::uint32_t block, co
   alignas(64) std::uint32_t passed[block_lanes];
   std::uint32_t any = 0;
   for (std::uint32_t lane = 0; lane < block_lanes; ++lane) {
-    const bool pass = Test::may_hit(Test::measure(Numbers<float>{numbers + lane, block_lanes}, ray, constants));
+    const bool pass =
+        Test::may_hit(Test::measure(Numbers<float>{numbers + lane, block_lanes}, ray, constants));
     passed[lane] = pass ? 1 : 0;
     any |= passed[lane];
   }
@@ -28,8 +29,8 @@ inline void test_block(const Triangles<Test>& triangles, std::uint32_t block, co
   for (std::uint32_t lane = 0; lane < block_lanes; ++lane) {
     const std::uint32_t i = block * block_lanes + lane;
     if (passed[lane] == 0 || i >= triangles.count) continue;
-    triangles.settle(Test::measure(Numbers<float>{numbers + lane, block_lanes}, ray, constants), i, ray, constants,
-                     hit);
+    triangles.settle(Test::measure(Numbers<float>{numbers + lane, block_lanes}, ray, constants), i, ray,
+                     constants, hit);
   }
 }
 

@@ -1,7 +1,7 @@
 #pragma once
-// Brute force in the loop order of a CPU: triangles lie in blocks of 16, number by number, so that one instruction
-// measures as many as a vector has lanes; and a batch of rays goes through a chunk of blocks that fits the first-level
-// cache before the next chunk is touched. The result is that of BruteForce, bit for bit.
+// Brute force in the loop order of a CPU: triangles lie in blocks of 16, number by number, so that one
+// instruction measures as many as a vector has lanes; and a batch of rays goes through a chunk of blocks that
+// fits the first-level cache before the next chunk is touched. The result is that of BruteForce, bit for bit.
 
 #include "chapters/01_ray_casting/ray_casting.h"
 

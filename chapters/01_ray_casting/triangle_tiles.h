@@ -1,7 +1,8 @@
 #pragma once
-// Brute force in the loop order of a GPU: a block of threads, some rays each, brings a tile of triangles into shared
-// memory together, then every thread tests its rays against the tile. All threads of a warp read the same triangle at
-// the same time, which shared memory serves in one go. The result is that of BruteForce, bit for bit.
+// Brute force in the loop order of a GPU: a block of threads, some rays each, brings a tile of triangles into
+// shared memory together, then every thread tests its rays against the tile. All threads of a warp read the
+// same triangle at the same time, which shared memory serves in one go. The result is that of BruteForce, bit
+// for bit.
 
 #include <type_traits>
 
@@ -12,29 +13,45 @@ namespace trilha {
 
 constexpr int tile_threads = 128;
 constexpr int tile_triangles = 128;
-constexpr int rays_a_thread = 2;  // two rays share what is read of a triangle, and hide each other's latency
+constexpr int rays_a_thread = 4;  // they share what is read of a triangle, and hide each other's latency
 
 /// One triangle in shared memory: three 16-byte reads, whatever the test keeps.
 struct alignas(16) TileSlot {
   float numbers[12];
 };
 
-/// Tests a thread's rays against the tile. In a turned tile coordinates lie in the order that all the rays want.
+/// Measures the triangle in a slot. In a turned tile coordinates lie in the order that all the rays want.
+template <bool turned, class Test, class Constants>
+__device__ inline auto measure_slot(const float* s, const Ray& ray, const Constants& constants) {
+  if constexpr (turned) {
+    return Test::measure_turned(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], constants);
+  } else {
+    return Test::measure(Numbers<float>{s}, ray, constants);
+  }
+}
+
+/// The rare second half. It is a call, so that its many registers do not weigh on the loop.
+template <bool turned, class Test, class Constants>
+__device__ __noinline__ Hit settle_slot(const Triangles<Test> triangles, const float* slot, std::uint32_t i,
+                                        const Ray ray, const Constants constants, Hit hit) {
+  const auto measure = measure_slot<turned, Test>(slot, ray, constants);
+  if (Test::may_hit(measure)) triangles.settle(measure, i, ray, constants, hit);
+  return hit;
+}
+
+/// Tests a thread's rays against the tile: measured without a branch, one branch for all of them.
 template <bool turned, class Test, class Constants>
 __device__ inline void test_tile(const Triangles<Test>& triangles, const TileSlot* tile, std::uint32_t begin,
                                  std::uint32_t count, const Ray* ray, const Constants* constants, Hit* hit) {
+#pragma unroll 2
   for (std::uint32_t j = 0; j < count; ++j) {
-    const float* s = tile[j].numbers;
-    for (int r = 0; r < rays_a_thread; ++r) {
-      const auto measure = [&] {
-        if constexpr (turned) {
-          return Test::measure_turned(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], constants[r]);
-        } else {
-          return Test::measure(Numbers<float>{s}, ray[r], constants[r]);
-        }
-      }();
-      if (Test::may_hit(measure)) triangles.settle(measure, begin + j, ray[r], constants[r], hit[r]);
-    }
+    const float* slot = tile[j].numbers;
+    bool any = false;
+    for (int r = 0; r < rays_a_thread; ++r)
+      any |= Test::may_hit(measure_slot<turned, Test>(slot, ray[r], constants[r]));
+    if (!any) continue;
+    for (int r = 0; r < rays_a_thread; ++r)
+      hit[r] = settle_slot<turned>(triangles, slot, begin + j, ray[r], constants[r], hit[r]);
   }
 }
 
@@ -55,8 +72,9 @@ __global__ void __launch_bounds__(tile_threads)
     hit[r].t = ray[r].t_max;
   }
 
-  // The watertight test reads coordinates in an order that depends on the ray. Where all rays of the block want the
-  // same order, which neighbours nearly always do, the triangles are turned once, on their way into the tile.
+  // The watertight test reads coordinates in an order that depends on the ray. Where all rays of the block
+  // want the same order, which neighbours nearly always do, the triangles are turned once, on their way into
+  // the tile.
   int turn = -1;
   if constexpr (watertight) {
     __shared__ int wanted;
@@ -89,12 +107,13 @@ __global__ void __launch_bounds__(tile_threads)
 
 /// The nearest hit of each of n rays; all arrays lie on the device.
 template <class Test>
-void trace_tiles(const Stream& stream, const Triangles<Test>& triangles, const Ray* rays, Hit* hits, std::size_t n) {
+void trace_tiles(const Stream& stream, const Triangles<Test>& triangles, const Ray* rays, Hit* hits,
+                 std::size_t n) {
   if (n == 0) return;
   constexpr std::size_t rays_a_block = tile_threads * rays_a_thread;
   const auto blocks = static_cast<unsigned>((n + rays_a_block - 1) / rays_a_block);
-  trace_tiles_kernel<<<blocks, tile_threads, 0, static_cast<cudaStream_t>(stream.native())>>>(triangles, rays, hits,
-                                                                                              n);
+  trace_tiles_kernel<<<blocks, tile_threads, 0, static_cast<cudaStream_t>(stream.native())>>>(triangles, rays,
+                                                                                              hits, n);
   cuda::check(cudaGetLastError(), "trace_tiles_kernel");
 }
 

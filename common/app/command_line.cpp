@@ -38,7 +38,8 @@ void parse_size(const std::string& text, Options& options) {
   const std::size_t cross = text.find('x');
   const auto width = parsed<long long>(text.substr(0, cross));
   const auto height = cross == std::string::npos ? std::nullopt : parsed<long long>(text.substr(cross + 1));
-  if (!width || !height) throw UsageError("--size: '" + text + "' is no size; write WIDTHxHEIGHT, such as 640x480");
+  if (!width || !height)
+    throw UsageError("--size: '" + text + "' is no size; write WIDTHxHEIGHT, such as 640x480");
   constexpr long long most = 32768;
   constexpr long long most_pixels = 1ll << 28;
   if (*width < 1 || *height < 1 || *width > most || *height > most || *width * *height > most_pixels)
@@ -68,13 +69,18 @@ void add_settings(CLI::App& app, const Settings& settings) {
     const std::string flag = "--" + setting.name;
     const std::string group = "Settings of this chapter";
     if (setting.kind == Setting::Kind::flag) {
-      app.add_flag_callback(flag, [&setting] { setting.put(1); }, setting.help)->group(group);
-      app.add_flag_callback("--no-" + setting.name, [&setting] { setting.put(0); }, "")->group("");
+      app.add_flag_callback(
+             flag, [&setting] { setting.put(1); }, setting.help)
+          ->group(group);
+      app.add_flag_callback(
+             "--no-" + setting.name, [&setting] { setting.put(0); }, "")
+          ->group("");
       continue;
     }
     std::string help = setting.help + " [" + setting.text() + "]";
     if (setting.kind == Setting::Kind::choice) help += ": " + choice_names(setting);
-    app.add_option_function<std::string>(flag, [&setting](const std::string& text) { setting.set_text(text); }, help)
+    app.add_option_function<std::string>(
+           flag, [&setting](const std::string& text) { setting.set_text(text); }, help)
         ->group(group)
         ->type_name(setting.kind == Setting::Kind::choice ? "NAME" : "NUMBER");
   }
@@ -83,23 +89,27 @@ void add_settings(CLI::App& app, const Settings& settings) {
 void print_settings(const Settings& settings) {
   for (const Setting& setting : settings.all()) {
     std::cout << "--" << setting.name << "  " << setting.help << " [" << setting.text() << "]\n";
-    for (const Choice& choice : setting.choices) std::cout << "    " << choice.name << "  " << choice.help << "\n";
+    for (const Choice& choice : setting.choices)
+      std::cout << "    " << choice.name << "  " << choice.help << "\n";
   }
 }
 
 }  // namespace
 
-std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings& settings, Options& options) {
+std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings& settings,
+                                     Options& options) {
   const auto [program, title] = demo.name();
   CLI::App app(title + ", a chapter of Trilha", program);
   app.get_formatter()->column_width(34);
   std::string backend = "auto", size, eye, target, up, heatmap;
   std::optional<float> field_of_view;
   bool headless = false;
-  app.add_option("--scene", options.scene, "name of a scene (--list-scenes), or a file")->type_name("NAME|FILE");
+  app.add_option("--scene", options.scene, "name of a scene (--list-scenes), or a file")
+      ->type_name("NAME|FILE");
   app.add_option("--backend", backend, "where to compute [auto]: auto|cpu|cuda")->type_name("NAME");
   app.add_flag("--headless", headless, "render to a file, open no window (this version has none yet)");
-  app.add_option("--output", options.output, "the image, .png or .hdr [" + program + ".png]")->type_name("FILE");
+  app.add_option("--output", options.output, "the image, .png or .hdr [" + program + ".png]")
+      ->type_name("FILE");
   app.add_option("--size", size, "of the image, in pixels [640x480]")->type_name("WxH");
   auto* samples = app.add_option("--samples", options.samples, "rays a pixel [1]")->type_name("N");
   app.add_option("--time", options.seconds, "add samples until so many seconds have passed")
@@ -149,7 +159,8 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
       known = known || name == heatmap;
       names += (names.empty() ? "" : ", ") + name;
     }
-    if (!known) throw UsageError("--heatmap: '" + heatmap + "' is no measure of this chapter; it has: " + names);
+    if (!known)
+      throw UsageError("--heatmap: '" + heatmap + "' is no measure of this chapter; it has: " + names);
     demo.show_heatmap(heatmap);
   }
   if (options.list_settings) {

@@ -10,21 +10,21 @@ namespace trilha {
 
 /// What every chapter's program can be told, beside the settings of its chapter.
 struct Options {
-  std::string scene;                      ///< a name or a file; empty for the default
-  std::optional<Backend> backend;         ///< empty: CUDA if it is there
-  std::string output;                     ///< empty: <chapter>.png in the working directory
+  std::string scene;               ///< a name or a file; empty for the default
+  std::optional<Backend> backend;  ///< empty: CUDA if it is there
+  std::string output;              ///< empty: <chapter>.png in the working directory
   int width = 640, height = 480;
   int samples = 1;
-  double seconds = 0;                     ///< if above 0, samples are added until they have passed
+  double seconds = 0;  ///< if above 0, samples are added until they have passed
   std::uint64_t seed = 0;
-  int threads = 0;                        ///< 0: all
-  std::optional<vec3> eye, target, up;    ///< override the scene's camera
+  int threads = 0;                      ///< 0: all
+  std::optional<vec3> eye, target, up;  ///< override the scene's camera
   std::optional<float> field_of_view;
   bool explain = false, json = false, quiet = false, list_settings = false, list_scenes = false;
 };
 
-/// Reads the command line (and a --config file) into options, settings and the demo's heat map. Returns an exit code if
-/// the program is done, after --help say. Throws UsageError and InputError.
+/// Reads the command line (and a --config file) into options, settings and the demo's heat map. Returns an
+/// exit code if the program is done, after --help say. Throws UsageError and InputError.
 std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings& settings, Options& options);
 
 }  // namespace trilha

@@ -43,11 +43,12 @@ class Demo {
 
   virtual void declare_settings(Settings& settings) = 0;
 
-  /// Builds all that the settings need, on the stream's backend; replaces what was built before. The scene stays alive
-  /// and unchanged until the next build.
+  /// Builds all that the settings need, on the stream's backend; replaces what was built before. The scene
+  /// stays alive and unchanged until the next build.
   virtual void build(const Scene& scene, const Stream& stream) = 0;
 
-  /// Adds a sample to every pixel of the film. Returns false if told to stop; what was done stays in the film.
+  /// Adds a sample to every pixel of the film. Returns false if told to stop; what was done stays in the
+  /// film.
   virtual bool add_sample(Film& film, const SampleRequest& request) = 0;
 
   /// The film as an image: its encoding, and colours in place of counts where a heat map was asked for.

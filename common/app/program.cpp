@@ -84,8 +84,8 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
       return !progress.cancelled();
     };
     const bool jittered = timed || most > 1;
-    const bool finished = demo.add_sample(
-        film, {scene.camera, static_cast<std::uint32_t>(outcome.samples), jittered, options.seed, keep_going});
+    const bool finished = demo.add_sample(film, {scene.camera, static_cast<std::uint32_t>(outcome.samples),
+                                                 jittered, options.seed, keep_going});
     outcome.stopped = !finished;
     if (!finished) break;
     if (progress.cancelled()) {
@@ -107,7 +107,8 @@ double median(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
-/// Measures each omission on an image small enough to take a tenth of a second: five turns of kept and left out.
+/// Measures each omission on an image small enough to take a tenth of a second: five turns of kept and left
+/// out.
 std::vector<Saving> measure(Demo& demo, const Scene& scene, const Stream& stream, Options options,
                             const Outcome& outcome) {
   const double affordable = std::max(1024.0, 1e5 * outcome.mrays_per_s());
@@ -146,9 +147,12 @@ std::vector<Saving> measure(Demo& demo, const Scene& scene, const Stream& stream
 std::string with_unit(double bytes) {
   char text[32];
   const double size = std::fabs(bytes);
-  if (size < 1e4) std::snprintf(text, sizeof text, "%.0f B", bytes);
-  else if (size < 1e7) std::snprintf(text, sizeof text, "%.1f kB", bytes / 1e3);
-  else std::snprintf(text, sizeof text, "%.1f MB", bytes / 1e6);
+  if (size < 1e4)
+    std::snprintf(text, sizeof text, "%.0f B", bytes);
+  else if (size < 1e7)
+    std::snprintf(text, sizeof text, "%.1f kB", bytes / 1e3);
+  else
+    std::snprintf(text, sizeof text, "%.1f MB", bytes / 1e6);
   return text;
 }
 
@@ -171,13 +175,17 @@ void print_text(const Demo& demo, const Scene& scene, const Stream& stream, cons
   line("build") << number(outcome.build_ms, 2) << " ms\n";
   line("render") << number(outcome.render_ms, 1) << " ms";
   for (std::size_t i = 0; i < outcome.stage_ms.size(); ++i)
-    std::cout << (i == 0 ? " (" : ", ") << outcome.stage_ms[i].first << " " << number(outcome.stage_ms[i].second, 1);
-  std::cout << (outcome.stage_ms.empty() ? "" : ")") << ", " << number(outcome.mrays_per_s(), 3) << " Mrays/s\n";
+    std::cout << (i == 0 ? " (" : ", ") << outcome.stage_ms[i].first << " "
+              << number(outcome.stage_ms[i].second, 1);
+  std::cout << (outcome.stage_ms.empty() ? "" : ")") << ", " << number(outcome.mrays_per_s(), 3)
+            << " Mrays/s\n";
   line("memory") << with_unit(static_cast<double>(outcome.bytes)) << " at most\n";
   for (std::size_t i = 0; i < savings.size(); ++i) {
     const Saving& s = savings[i];
     line(i == 0 ? "left out" : "") << s.omission.what;
-    if (s.ms) std::cout << ": " << s.omission.why << "; saved " << with_unit(*s.bytes) << ", " << number(*s.ms, 3) << " ms";
+    if (s.ms)
+      std::cout << ": " << s.omission.why << "; saved " << with_unit(*s.bytes) << ", " << number(*s.ms, 3)
+                << " ms";
     std::cout << "\n";
   }
   if (!options.explain && !savings.empty()) line("") << "(--explain says why, and measures what it saved)\n";
@@ -194,9 +202,12 @@ void print_json(const Demo& demo, const Settings& settings, const Scene& scene, 
                         {"saved_ms", s.ms ? Json(*s.ms) : Json()}});
   Json values = Json::object();
   for (const Setting& setting : settings.all()) {
-    if (setting.kind == Setting::Kind::flag) values[setting.name] = setting.get() != 0;
-    else if (setting.kind == Setting::Kind::choice) values[setting.name] = setting.text();
-    else values[setting.name] = setting.get();
+    if (setting.kind == Setting::Kind::flag)
+      values[setting.name] = setting.get() != 0;
+    else if (setting.kind == Setting::Kind::choice)
+      values[setting.name] = setting.text();
+    else
+      values[setting.name] = setting.get();
   }
   Json stages = Json::object();
   for (const auto& [name, ms] : outcome.stage_ms) stages[name] = ms;
@@ -224,7 +235,8 @@ void print_json(const Demo& demo, const Settings& settings, const Scene& scene, 
 void print_scenes() {
   for (const SceneEntry& entry : scene_table())
     std::cout << entry.name << std::string(std::max<int>(1, 12 - static_cast<int>(entry.name.size())), ' ')
-              << entry.what << (entry.available ? "" : " (not here: ./trilha assets " + entry.name + ")") << "\n";
+              << entry.what << (entry.available ? "" : " (not here: ./trilha assets " + entry.name + ")")
+              << "\n";
 }
 
 int run(int argc, char** argv, Demo& demo) {
@@ -252,8 +264,10 @@ int run(int argc, char** argv, Demo& demo) {
     write_image(options.output, demo.develop(film, stream));
   }
   if (options.explain) savings = measure(demo, scene, stream, options, outcome);
-  if (options.json) print_json(demo, settings, scene, stream, options, outcome, savings);
-  else if (!options.quiet) print_text(demo, scene, stream, options, outcome, savings);
+  if (options.json)
+    print_json(demo, settings, scene, stream, options, outcome, savings);
+  else if (!options.quiet)
+    print_text(demo, scene, stream, options, outcome, savings);
   if (outcome.stopped && interrupted()) warn("stopped by request: the image holds what was done by then");
   std::cout.flush();
   if (!std::cout) throw InputError("standard output: cannot be written; is there room for it?");

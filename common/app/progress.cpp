@@ -21,7 +21,8 @@ std::string duration(double seconds) {
   if (seconds < 60) {
     std::snprintf(text, sizeof text, "%.0f s", seconds);
   } else if (seconds < 3600) {
-    std::snprintf(text, sizeof text, "%d:%02d min", static_cast<int>(seconds) / 60, static_cast<int>(seconds) % 60);
+    std::snprintf(text, sizeof text, "%d:%02d min", static_cast<int>(seconds) / 60,
+                  static_cast<int>(seconds) % 60);
   } else {
     std::snprintf(text, sizeof text, "%.1f h", seconds / 3600);
   }
@@ -55,7 +56,8 @@ void Progress::advance(double units) {
   if (quiet_ || seconds() - shown_at_ < (terminal_ ? 0.1 : 3.0)) return;
   const double fraction = total_ > 0 ? done_ / total_ : 1;
   const double elapsed = seconds();
-  const double left = std::min(fraction > 0 ? elapsed / fraction - elapsed : 0, std::max(limit_ - elapsed, 0.0));
+  const double left =
+      std::min(fraction > 0 ? elapsed / fraction - elapsed : 0, std::max(limit_ - elapsed, 0.0));
   if (terminal_) {
     constexpr int width = 32;
     std::string bar(width, '.');

@@ -5,8 +5,8 @@
 
 namespace trilha {
 
-/// Tells how far long work is, on standard error: a bar with the time left on a terminal, a line every few seconds
-/// elsewhere. Work asks it whether to stop.
+/// Tells how far long work is, on standard error: a bar with the time left on a terminal, a line every few
+/// seconds elsewhere. Work asks it whether to stop.
 class Progress {
  public:
   /// `quiet` shows nothing. The work consists of `total` units of any kind.

@@ -45,24 +45,46 @@ void Setting::set_text(const std::string& text) const {
   if (error != std::errc() || end != text.data() + text.size()) throw UsageError(refused + "is no number");
   if (kind == Kind::integer && x != std::floor(x)) throw UsageError(refused + "is no whole number");
   if (!(x >= low && x <= high))
-    throw InputError(refused + "is out of range; it goes from " + number_text(low) + " to " + number_text(high));
+    throw InputError(refused + "is out of range; it goes from " + number_text(low) + " to " +
+                     number_text(high));
   put(x);
 }
 
 void Settings::flag(const std::string& name, bool& value, Effect effect, const std::string& help) {
-  add({name, help, Setting::Kind::flag, effect, 0, 1, {}, [&value] { return value; },
+  add({name,
+       help,
+       Setting::Kind::flag,
+       effect,
+       0,
+       1,
+       {},
+       [&value] { return value; },
        [&value](double x) { value = x != 0; }});
 }
 
 void Settings::integer(const std::string& name, int& value, int low, int high, Effect effect,
                        const std::string& help) {
-  add({name, help, Setting::Kind::integer, effect, double(low), double(high), {}, [&value] { return value; },
+  add({name,
+       help,
+       Setting::Kind::integer,
+       effect,
+       double(low),
+       double(high),
+       {},
+       [&value] { return value; },
        [&value](double x) { value = static_cast<int>(x); }});
 }
 
 void Settings::number(const std::string& name, float& value, float low, float high, Effect effect,
                       const std::string& help) {
-  add({name, help, Setting::Kind::number, effect, low, high, {}, [&value] { return value; },
+  add({name,
+       help,
+       Setting::Kind::number,
+       effect,
+       low,
+       high,
+       {},
+       [&value] { return value; },
        [&value](double x) { value = static_cast<float>(x); }});
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// A setting is declared once, beside the variable that holds it; its command-line flag, its widget and its column in
-// reports come from that declaration.
+// A setting is declared once, beside the variable that holds it; its command-line flag, its widget and its
+// column in reports come from that declaration.
 
 #include <functional>
 #include <string>
@@ -33,15 +33,18 @@ struct Setting {
 
   /// The value as a word or number, as the command line takes it.
   std::string text() const;
-  /// Sets the value from such a text. Throws UsageError if it is no such value, InputError if it is out of range.
+  /// Sets the value from such a text. Throws UsageError if it is no such value, InputError if it is out of
+  /// range.
   void set_text(const std::string& text) const;
 };
 
 class Settings {
  public:
   void flag(const std::string& name, bool& value, Effect effect, const std::string& help);
-  void integer(const std::string& name, int& value, int low, int high, Effect effect, const std::string& help);
-  void number(const std::string& name, float& value, float low, float high, Effect effect, const std::string& help);
+  void integer(const std::string& name, int& value, int low, int high, Effect effect,
+               const std::string& help);
+  void number(const std::string& name, float& value, float low, float high, Effect effect,
+              const std::string& help);
   template <class Enum>
   void choice(const std::string& name, Enum& value, std::vector<Choice> choices, Effect effect,
               const std::string& help) {

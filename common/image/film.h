@@ -5,8 +5,9 @@
 
 namespace trilha {
 
-/// How an index range covers an image: 32×32-pixel tiles row by row, in each 8×4-pixel tiles row by row, so that a warp
-/// is 8×4 neighbours and a CPU batch is a tile. Tiles at the right and lower edge reach over it: ask `inside`.
+/// How an index range covers an image: 32×32-pixel tiles row by row, in each 8×4-pixel tiles row by row, so
+/// that a warp is 8×4 neighbours and a CPU batch is a tile. Tiles at the right and lower edge reach over it:
+/// ask `inside`.
 struct Tiling {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
@@ -14,7 +15,9 @@ struct Tiling {
   static constexpr std::size_t tile_size = 32 * 32;
 
   TRILHA_HD std::uint32_t tiles_across() const { return (width + 31) / 32; }
-  TRILHA_HD std::size_t tiles() const { return static_cast<std::size_t>(tiles_across()) * ((height + 31) / 32); }
+  TRILHA_HD std::size_t tiles() const {
+    return static_cast<std::size_t>(tiles_across()) * ((height + 31) / 32);
+  }
   TRILHA_HD std::size_t size() const { return tiles() * tile_size; }
 
   /// The pixel of index i: x from the left, y from the top.
@@ -22,7 +25,8 @@ struct Tiling {
     const auto tile = static_cast<std::uint32_t>(i / tile_size);
     const auto rest = static_cast<std::uint32_t>(i % tile_size);
     const std::uint32_t small = rest / 32, lane = rest % 32;
-    return {tile % tiles_across() * 32 + small % 4 * 8 + lane % 8, tile / tiles_across() * 32 + small / 4 * 4 + lane / 8};
+    return {tile % tiles_across() * 32 + small % 4 * 8 + lane % 8,
+            tile / tiles_across() * 32 + small / 4 * 4 + lane / 8};
   }
   TRILHA_HD bool inside(const Vec2<std::uint32_t>& p) const { return p.x < width && p.y < height; }
   TRILHA_HD std::size_t offset(const Vec2<std::uint32_t>& p) const {

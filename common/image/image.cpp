@@ -19,17 +19,19 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
-  throw InputError(path + ": cannot be written: " + what + "; name a .png or .hdr file in a folder with room for it");
+  throw InputError(path + ": cannot be written: " + what +
+                   "; name a .png or .hdr file in a folder with room for it");
 }
 
 std::string extension(const std::string& path) {
   std::string result = fs::path(path).extension().string();
-  std::transform(result.begin(), result.end(), result.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::transform(result.begin(), result.end(), result.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
   return result;
 }
 
-/// A file that takes its name only when it is complete. A path that is no plain file, such as /dev/stdout, is written
-/// to directly.
+/// A file that takes its name only when it is complete. A path that is no plain file, such as /dev/stdout, is
+/// written to directly.
 class WholeFile {
  public:
   explicit WholeFile(std::string path) : path_(std::move(path)), temporary_(path_) {
@@ -87,7 +89,8 @@ float srgb_encoded(float light) {
 void check_can_write(const std::string& path) {
   const std::string type = extension(path);
   if (type != ".png" && type != ".hdr" && !fs::is_character_file(path))
-    refuse(path, type.empty() ? "it has no extension that says what to write" : "'" + type + "' is no known image type");
+    refuse(path, type.empty() ? "it has no extension that says what to write"
+                              : "'" + type + "' is no known image type");
   WholeFile attempt(path);
 }
 
@@ -104,7 +107,8 @@ void write_image(const std::string& path, const Image& image) {
         const float value = image.pixels[i][c];
         encoded[3 * i + c] = to_byte(image.encoding == Encoding::light ? srgb_encoded(value) : value);
       }
-    written = stbi_write_png_to_func(append, &bytes, image.width, image.height, 3, encoded.data(), 3 * image.width);
+    written =
+        stbi_write_png_to_func(append, &bytes, image.width, image.height, 3, encoded.data(), 3 * image.width);
   }
   if (!written) refuse(path, "the encoder failed, out of memory");
   WholeFile file(path);

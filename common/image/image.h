@@ -7,7 +7,8 @@
 
 namespace trilha {
 
-/// What the numbers of an image mean: light, to be encoded as sRGB for a screen, or colours that are shown as they are.
+/// What the numbers of an image mean: light, to be encoded as sRGB for a screen, or colours that are shown as
+/// they are.
 enum class Encoding { light, display };
 
 /// width × height colours, row by row from the top. Light is linear, with Rec. 709 primaries.
@@ -21,12 +22,12 @@ struct Image {
 /// The sRGB transfer function (IEC 61966-2-1) of one channel; the argument is clamped to [0, 1], NaN is 0.
 float srgb_encoded(float light);
 
-/// Is the path a name that write_image knows (.png, .hdr), in a folder that can be written to? Throws InputError if
-/// not: said before an hour of rendering rather than after.
+/// Is the path a name that write_image knows (.png, .hdr), in a folder that can be written to? Throws
+/// InputError if not: said before an hour of rendering rather than after.
 void check_can_write(const std::string& path);
 
-/// Writes a PNG (eight bits, sRGB) or a Radiance HDR (light as it is). The file appears whole or not at all: it is
-/// written beside its place and then renamed. Throws InputError, with the system's reason.
+/// Writes a PNG (eight bits, sRGB) or a Radiance HDR (light as it is). The file appears whole or not at all:
+/// it is written beside its place and then renamed. Throws InputError, with the system's reason.
 void write_image(const std::string& path, const Image& image);
 
 }  // namespace trilha

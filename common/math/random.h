@@ -40,7 +40,8 @@ class Random {
     return static_cast<std::uint32_t>((static_cast<std::uint64_t>(bits()) * n) >> 32);
   }
 
-  /// A bijection on 64 bits that leaves no structure between neighbours (SplitMix64's finaliser, Steele et al. 2014).
+  /// A bijection on 64 bits that leaves no structure between neighbours (SplitMix64's finaliser, Steele et
+  /// al. 2014).
   TRILHA_HD static std::uint64_t mixed(std::uint64_t x) {
     x += 0x9e3779b97f4a7c15ull;
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;

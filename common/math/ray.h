@@ -6,7 +6,8 @@
 
 namespace trilha {
 
-/// The points origin + t·direction with t in [t_min, t_max). The direction need not have length one; t is in its units.
+/// The points origin + t·direction with t in [t_min, t_max). The direction need not have length one; t is in
+/// its units.
 template <class T>
 struct alignas(4 * sizeof(T)) RayOf {
   Vec3<T> origin{0};
@@ -18,8 +19,8 @@ using Ray = RayOf<float>;
 
 constexpr std::uint32_t no_primitive = 0xffffffffu;
 
-/// Where a ray meets a primitive: at t, with barycentric coordinates u (of the second vertex) and v (of the third).
-/// A miss has primitive == no_primitive and t == t_max of the ray.
+/// Where a ray meets a primitive: at t, with barycentric coordinates u (of the second vertex) and v (of the
+/// third). A miss has primitive == no_primitive and t == t_max of the ray.
 struct Hit {
   float t = std::numeric_limits<float>::infinity();
   std::uint32_t primitive = no_primitive;

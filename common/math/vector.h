@@ -44,7 +44,8 @@ TRILHA_HD constexpr T max(T a, T b) {
   return a > b ? a : b;
 }
 
-/// The same in one instruction of either machine, which they differ in for NaN: for places where that cannot matter.
+/// The same in one instruction of either machine, which they differ in for NaN: for places where that cannot
+/// matter.
 TRILHA_HD inline float quick_min(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fminf(a, b);

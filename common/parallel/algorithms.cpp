@@ -56,9 +56,9 @@ std::size_t compact(const Stream& stream, const std::uint8_t* flags, std::size_t
   TRILHA_ON_DEVICE(compact(stream.native(), flags, n, indices));
 }
 
-#define TRILHA_REDUCE(T)                                                                     \
-  template T reduce<T, Sum>(const Stream&, const T*, std::size_t, T, Sum);                   \
-  template T reduce<T, Minimum>(const Stream&, const T*, std::size_t, T, Minimum);           \
+#define TRILHA_REDUCE(T)                                                           \
+  template T reduce<T, Sum>(const Stream&, const T*, std::size_t, T, Sum);         \
+  template T reduce<T, Minimum>(const Stream&, const T*, std::size_t, T, Minimum); \
   template T reduce<T, Maximum>(const Stream&, const T*, std::size_t, T, Maximum);
 TRILHA_REDUCE(std::uint32_t)
 TRILHA_REDUCE(std::uint64_t)

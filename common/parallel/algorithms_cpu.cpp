@@ -17,14 +17,15 @@ namespace {
 
 constexpr std::size_t grain = 1 << 15;  // 128 KiB of 32-bit values: far above the cost of handing out a task
 
-/// Splits n into equal blocks, two a thread at most, each of `grain` or more: few enough that a serial scan over the
-/// blocks' sums costs nothing.
+/// Splits n into equal blocks, two a thread at most, each of `grain` or more: few enough that a serial scan
+/// over the blocks' sums costs nothing.
 struct Blocks {
   std::size_t n;
   std::size_t count;
 
   explicit Blocks(std::size_t size)
-      : n(size), count(std::clamp<std::size_t>(size / grain, 1, 2 * static_cast<std::size_t>(thread_count()))) {}
+      : n(size),
+        count(std::clamp<std::size_t>(size / grain, 1, 2 * static_cast<std::size_t>(thread_count()))) {}
   std::size_t begin(std::size_t block) const { return n / count * block + std::min(block, n % count); }
 
   /// body(block, begin, end) for every block, in parallel.
@@ -114,9 +115,9 @@ std::size_t compact(const std::uint8_t* flags, std::size_t n, std::uint32_t* ind
   return first.back();
 }
 
-#define TRILHA_REDUCE(T)                                                    \
-  template T reduce<T, Sum>(const T*, std::size_t, T, Sum);                 \
-  template T reduce<T, Minimum>(const T*, std::size_t, T, Minimum);         \
+#define TRILHA_REDUCE(T)                                            \
+  template T reduce<T, Sum>(const T*, std::size_t, T, Sum);         \
+  template T reduce<T, Minimum>(const T*, std::size_t, T, Minimum); \
   template T reduce<T, Maximum>(const T*, std::size_t, T, Maximum);
 TRILHA_REDUCE(std::uint32_t)
 TRILHA_REDUCE(std::uint64_t)

@@ -72,7 +72,8 @@ std::string device_name(Backend backend) {
 
 void set_thread_count(int threads) {
   using Control = tbb::global_control;
-  thread_limit() = threads > 0 ? std::make_unique<Control>(Control::max_allowed_parallelism, threads) : nullptr;
+  thread_limit() =
+      threads > 0 ? std::make_unique<Control>(Control::max_allowed_parallelism, threads) : nullptr;
 }
 
 int thread_count() {
@@ -107,7 +108,7 @@ void* allocate(Backend backend, std::size_t bytes) {
 #if defined(__CUDACC__)
   if (backend == Backend::cuda) memory = cuda::allocate(bytes);
 #endif
-  if (backend == Backend::cpu) memory = ::operator new(bytes, std::align_val_t{alignment});
+  if (backend == Backend::cpu) memory = ::operator new (bytes, std::align_val_t{alignment});
   if (!memory) throw DeviceError(why_unavailable(backend));
   account(backend).add(bytes);
   return memory;
@@ -118,7 +119,7 @@ void deallocate(Backend backend, void* memory, std::size_t bytes) noexcept {
 #if defined(__CUDACC__)
   if (backend == Backend::cuda) cuda::deallocate(memory);
 #endif
-  if (backend == Backend::cpu) ::operator delete(memory, std::align_val_t{alignment});
+  if (backend == Backend::cpu) ::operator delete (memory, std::align_val_t{alignment});
   account(backend).live -= bytes;
 }
 

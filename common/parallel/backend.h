@@ -1,5 +1,6 @@
 #pragma once
-// Where work runs: the CPU (oneTBB) or a CUDA device. What cannot run is refused with DeviceError, in one line.
+// Where work runs: the CPU (oneTBB) or a CUDA device. What cannot run is refused with DeviceError, in one
+// line.
 
 #include <cstddef>
 #include <memory>
@@ -24,8 +25,8 @@ std::string device_name(Backend backend);
 void set_thread_count(int threads);
 int thread_count();
 
-/// A sequence of work on one backend. Work in one stream is done in order; on the CPU each call returns when its work
-/// is done, on CUDA it returns at once.
+/// A sequence of work on one backend. Work in one stream is done in order; on the CPU each call returns when
+/// its work is done, on CUDA it returns at once.
 class Stream {
  public:
   /// The backend's common stream, made at first use. Throws DeviceError if the backend is not available.
@@ -47,13 +48,15 @@ class Stream {
   std::shared_ptr<void> native_;
 };
 
-/// Uninitialised memory of the backend, aligned to 256 bytes; null for 0 bytes. Throws std::bad_alloc on the CPU and
-/// CudaError on the device where there is not enough.
+/// Uninitialised memory of the backend, aligned to 256 bytes; null for 0 bytes. Throws std::bad_alloc on the
+/// CPU and CudaError on the device where there is not enough.
 void* allocate(Backend backend, std::size_t bytes);
 void deallocate(Backend backend, void* memory, std::size_t bytes) noexcept;
 
-/// Copies bytes from one backend's memory to another's and returns when it is done, after all earlier work of the stream.
-void copy(void* to, Backend to_backend, const void* from, Backend from_backend, std::size_t bytes, const Stream& stream);
+/// Copies bytes from one backend's memory to another's and returns when it is done, after all earlier work of
+/// the stream.
+void copy(void* to, Backend to_backend, const void* from, Backend from_backend, std::size_t bytes,
+          const Stream& stream);
 
 /// Sets every byte, in the stream's order.
 void fill_bytes(const Stream& stream, void* memory, unsigned char value, std::size_t bytes);

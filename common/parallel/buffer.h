@@ -26,7 +26,9 @@ class Buffer {
     copy(data_, backend_, values.data(), Backend::cpu, bytes(), stream);
   }
   Buffer(Buffer&& other) noexcept
-      : backend_(other.backend_), size_(std::exchange(other.size_, 0)), data_(std::exchange(other.data_, nullptr)) {}
+      : backend_(other.backend_),
+        size_(std::exchange(other.size_, 0)),
+        data_(std::exchange(other.data_, nullptr)) {}
   Buffer& operator=(Buffer&& other) noexcept {
     std::swap(backend_, other.backend_);
     std::swap(size_, other.size_);

@@ -26,26 +26,29 @@ struct IndexRange {
   std::size_t size() const { return end > begin ? end - begin : 0; }
 };
 
-/// Runs pass(i) for every i of the range, in any order and in parallel. A pass is a struct with its inputs and outputs
-/// as members and `TRILHA_HD void operator()(std::size_t i) const`. On the CPU the range is cut into batches of at
-/// least `batch` indices, and the call returns when all are done; on CUDA it returns at once, and the exception of a
-/// failed launch names the pass and the caller. A source that the C++ compiler sees can run passes on the CPU only.
+/// Runs pass(i) for every i of the range, in any order and in parallel. A pass is a struct with its inputs
+/// and outputs as members and `TRILHA_HD void operator()(std::size_t i) const`. On the CPU the range is cut
+/// into batches of at least `batch` indices, and the call returns when all are done; on CUDA it returns at
+/// once, and the exception of a failed launch names the pass and the caller. A source that the C++ compiler
+/// sees can run passes on the CPU only.
 template <class Pass>
 void for_each(const Stream& stream, IndexRange range, const Pass& pass, std::size_t batch = 1024,
               std::source_location where = std::source_location::current()) {
   if (range.size() == 0) return;
   if (stream.backend() == Backend::cpu) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(range.begin, range.end, std::max<std::size_t>(batch, 1)),
-                      [&pass](const tbb::blocked_range<std::size_t>& part) {
-                        const Pass local = pass;  // a copy that nothing else can change: its members stay in registers
-                        for (std::size_t i = part.begin(); i != part.end(); ++i) local(i);
-                      });
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(range.begin, range.end, std::max<std::size_t>(batch, 1)),
+        [&pass](const tbb::blocked_range<std::size_t>& part) {
+          const Pass local = pass;  // a copy that nothing else can change: its members stay in registers
+          for (std::size_t i = part.begin(); i != part.end(); ++i) local(i);
+        });
     return;
   }
 #if defined(__CUDACC__)
   cuda::launch(stream.native(), range.begin, range.end, pass, where);
 #else
-  throw std::logic_error(std::string(where.file_name()) + ": a pass for CUDA in a source that nvcc does not compile");
+  throw std::logic_error(std::string(where.file_name()) +
+                         ": a pass for CUDA in a source that nvcc does not compile");
 #endif
 }
 

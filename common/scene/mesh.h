@@ -8,14 +8,15 @@
 
 namespace trilha {
 
-/// Triangles that share vertices. What a file does not give, or the scene does not need, stays an empty vector.
+/// Triangles that share vertices. What a file does not give, or the scene does not need, stays an empty
+/// vector.
 struct Mesh {
   std::string name;
-  std::vector<vec3> positions;           ///< one a vertex
-  std::vector<uvec3> triangles;          ///< three vertex numbers a triangle, counter-clockwise seen from the front
-  std::vector<vec3> normals;             ///< empty, or one a vertex, of length one
-  std::vector<vec2> texture_coordinates; ///< empty, or one a vertex
-  std::vector<std::uint32_t> materials;  ///< empty (all triangles have material 0), or one a triangle
+  std::vector<vec3> positions;   ///< one a vertex
+  std::vector<uvec3> triangles;  ///< three vertex numbers a triangle, counter-clockwise seen from the front
+  std::vector<vec3> normals;     ///< empty, or one a vertex, of length one
+  std::vector<vec2> texture_coordinates;  ///< empty, or one a vertex
+  std::vector<std::uint32_t> materials;   ///< empty (all triangles have material 0), or one a triangle
 };
 
 Box bounds(const Mesh& mesh);

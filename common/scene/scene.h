@@ -38,7 +38,7 @@ struct SceneFeatures {
 struct Scene {
   std::string name;
   std::vector<Mesh> meshes;
-  std::vector<Material> materials;    ///< at least one
+  std::vector<Material> materials;  ///< at least one
   Camera camera;
   SceneFeatures features;
   std::vector<std::string> warnings;  ///< one line each, for the user
@@ -52,8 +52,8 @@ Box bounds(const Scene& scene);
 /// The features of the scene as its meshes and materials stand now.
 SceneFeatures features_of(const Scene& scene);
 
-/// The scene of that name ("bunny", "teaset", …) or in that file. An empty name asks for the default: the bunny if it
-/// has been fetched, else the shipped tea set, with a warning. Throws InputError.
+/// The scene of that name ("bunny", "teaset", …) or in that file. An empty name asks for the default: the
+/// bunny if it has been fetched, else the shipped tea set, with a warning. Throws InputError.
 Scene load_scene(const std::string& name_or_file);
 
 }  // namespace trilha

@@ -21,7 +21,8 @@ int floor_of(const std::string& path) {
 }
 
 bool starts_with_any(const std::string& text, const std::vector<std::string>& starts) {
-  return std::any_of(starts.begin(), starts.end(), [&](const std::string& s) { return text.rfind(s, 0) == 0; });
+  return std::any_of(starts.begin(), starts.end(),
+                     [&](const std::string& s) { return text.rfind(s, 0) == 0; });
 }
 
 /// Why `file` may not include `included` (both relative to the root), or nothing.
@@ -40,7 +41,9 @@ std::string objection(const std::string& file, const std::string& included, bool
   if (from == -2 && to == -1)
     return file.rfind("common/parallel/", 0) == 0 ? "" : "the door to cuda/ is common/parallel alone";
   if (from == -1 && to == -2)
-    return starts_with_any(included, {"common/math/", "common/parallel/"}) ? "" : "cuda/ knows common/math and common/parallel";
+    return starts_with_any(included, {"common/math/", "common/parallel/"})
+               ? ""
+               : "cuda/ knows common/math and common/parallel";
   if (from < 0 && to > 0) return "the ground floor knows no chapter";
   if (from > 0 && to > from) return "a chapter knows only those before it";
   const bool draws = file.rfind("common/app/", 0) == 0 || from > 0;
@@ -76,7 +79,8 @@ std::vector<std::string> violations(const fs::path& root) {
 
 }  // namespace
 
-// Catches: a chapter that leans on a later one, a shared file that knows a chapter, a window outside the shell.
+// Catches: a chapter that leans on a later one, a shared file that knows a chapter, a window outside the
+// shell.
 TEST_CASE("the book rule holds") {
   for (const std::string& violation : violations(trilha::root_folder())) FAIL_CHECK(violation);
 }
@@ -98,15 +102,17 @@ TEST_CASE("each way to break the book rule is seen") {
   };
   for (const auto& [planted_in, line] : plants) {
     fs::remove_all(root);
-    for (const char* file : {"chapters/01_ray_casting/ray_casting.h", "chapters/02_whitted/whitted.h", "cuda/runtime.h",
-                             "common/math/ray.h", "common/scene/mesh.h", "common/app/settings.h", "tests/testing.h"}) {
+    for (const char* file :
+         {"chapters/01_ray_casting/ray_casting.h", "chapters/02_whitted/whitted.h", "cuda/runtime.h",
+          "common/math/ray.h", "common/scene/mesh.h", "common/app/settings.h", "tests/testing.h"}) {
       fs::create_directories((root / file).parent_path());
       std::ofstream(root / file) << "#include <vector>\n" << (file == planted_in ? line + "\n" : "");
     }
     INFO(planted_in << " with " << line);
     CHECK(violations(root).size() == 1);
   }
-  std::ofstream(root / "chapters/02_whitted/whitted.h") << "#include \"chapters/01_ray_casting/ray_casting.h\"\n";
+  std::ofstream(root / "chapters/02_whitted/whitted.h")
+      << "#include \"chapters/01_ray_casting/ray_casting.h\"\n";
   CHECK(violations(root).empty());
   fs::remove_all(root);
 }

@@ -8,7 +8,8 @@
 
 using namespace trilha;
 
-// Catches: arithmetic that the compiler fused: a·b + c with and without fma has to differ where rounding says so.
+// Catches: arithmetic that the compiler fused: a·b + c with and without fma has to differ where rounding says
+// so.
 TEST_CASE("nothing is fused but what the code fuses") {
   volatile float a = 1.0f + 0x1p-12f, c = -(1.0f + 0x1p-11f);  // a·a = 1 + 2⁻¹¹ + 2⁻²⁴, which rounds to −c
   CHECK(a * a + c == 0.0f);
@@ -47,11 +48,13 @@ TEST_CASE("difference_of_products keeps its accuracy where the products cancel")
   }
 }
 
-// Catches: is_normal letting zero, subnormal, infinite or NaN values through, or refusing the ends of the range.
+// Catches: is_normal letting zero, subnormal, infinite or NaN values through, or refusing the ends of the
+// range.
 TEST_CASE("is_normal tells normal numbers from all others") {
   using Limits = std::numeric_limits<float>;
   for (const float x : {Limits::min(), Limits::max(), 1.0f}) CHECK((is_normal(x) && is_normal(-x)));
-  for (const float x : {0.0f, Limits::min() / 2, Limits::denorm_min(), Limits::infinity(), Limits::quiet_NaN()})
+  for (const float x :
+       {0.0f, Limits::min() / 2, Limits::denorm_min(), Limits::infinity(), Limits::quiet_NaN()})
     CHECK_FALSE((is_normal(x) || is_normal(-x)));
 }
 
@@ -69,7 +72,8 @@ TEST_CASE("random numbers are uniform, and streams differ") {
     }
     for (const auto& counts : {count, low}) {
       double chi = 0;
-      for (const int c : counts) chi += (c - draws / double(bins)) * (c - draws / double(bins)) / (draws / double(bins));
+      for (const int c : counts)
+        chi += (c - draws / double(bins)) * (c - draws / double(bins)) / (draws / double(bins));
       CHECK(chi > 180);  // χ² with 255 degrees of freedom lies in 180…347 with probability 0.9998
       CHECK(chi < 347);
     }
@@ -87,6 +91,7 @@ TEST_CASE("boxes unite, and the empty box is neutral") {
   const Box both = united(a, b);
   CHECK(both.lower == vec3(-1, 0, 3));
   CHECK(both.upper == vec3(1, 4, 6));
-  for (const Box& same : {united(b, Box{}), united(Box{}, b)}) CHECK((same.lower == b.lower && same.upper == b.upper));
+  for (const Box& same : {united(b, Box{}), united(Box{}, b)})
+    CHECK((same.lower == b.lower && same.upper == b.upper));
   CHECK(Box{vec3(-3e38f), vec3(3e38f)}.centre() == vec3(0));
 }

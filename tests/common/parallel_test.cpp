@@ -38,7 +38,8 @@ struct Square {
   TRILHA_HD void operator()(std::size_t i) const { out[i] = in[i] * in[i]; }
 };
 
-/// Marks the index, relative to a base beyond 2³², and writes wrong numbers where the index was cut to 32 bits.
+/// Marks the index, relative to a base beyond 2³², and writes wrong numbers where the index was cut to 32
+/// bits.
 struct MarkFar {
   std::size_t base;
   std::uint8_t* marks;
@@ -60,7 +61,8 @@ double best_ms(int turns, const std::function<void()>& work) {
   for (int k = 0; k < turns; ++k) {
     const auto start = std::chrono::steady_clock::now();
     work();
-    best = std::min(best, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+    best = std::min(
+        best, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
   }
   return best;
 }
@@ -77,14 +79,16 @@ TEST_CASE("for_each visits every index once") {
       for_each(backend, n, Square{in.data(), out.data()});
       const auto result = out.to_vector(backend);
       INFO(n << " on " << name(backend));
-      REQUIRE(std::equal(values.begin(), values.end(), result.begin(), [](auto a, auto b) { return a * a == b; }));
+      REQUIRE(std::equal(values.begin(), values.end(), result.begin(),
+                         [](auto a, auto b) { return a * a == b; }));
     }
 }
 
 // Catches: indices held in 32 bits, signed or not.
-TEST_CASE("for_each counts beyond 2^31 and 2^32") {
+TEST_CASE("for_each counts beyond 2^31 and 2^32", "[large]") {
   for (const Backend backend : backends()) {
-    for (const std::size_t base : {(std::size_t{1} << 31) - 3, (std::size_t{1} << 32) - 3, std::size_t{1} << 40}) {
+    for (const std::size_t base :
+         {(std::size_t{1} << 31) - 3, (std::size_t{1} << 32) - 3, std::size_t{1} << 40}) {
       Buffer<std::uint8_t> marks(backend, 1000);
       fill_bytes(backend, marks.data(), 0, marks.bytes());
       for_each(backend, {base, base + 1000}, MarkFar{base, marks.data()});
@@ -110,7 +114,8 @@ TEST_CASE("reduce is the standard library's accumulate") {
       CHECK(reduce(backend, data.data(), n, std::uint32_t{0}, Sum{}) ==
             std::accumulate(values.begin(), values.end(), std::uint32_t{0}));
       std::uint32_t lowest = 4000000000u, highest = 5;
-      for (const std::uint32_t value : values) lowest = std::min(lowest, value), highest = std::max(highest, value);
+      for (const std::uint32_t value : values)
+        lowest = std::min(lowest, value), highest = std::max(highest, value);
       CHECK(reduce(backend, data.data(), n, 4000000000u, Minimum{}) == lowest);
       CHECK(reduce(backend, data.data(), n, 5u, Maximum{}) == highest);
 
@@ -122,7 +127,8 @@ TEST_CASE("reduce is the standard library's accumulate") {
       std::vector<float> floats(values.begin(), values.end());
       const Buffer<float> float_data(backend, floats);
       const double sum = std::accumulate(floats.begin(), floats.end(), 0.0);
-      CHECK(reduce(backend, float_data.data(), n, 0.0f, Sum{}) == Approx(sum).epsilon(1e-5));  // log₂ n roundings
+      CHECK(reduce(backend, float_data.data(), n, 0.0f, Sum{}) ==
+            Approx(sum).epsilon(1e-5));  // log₂ n roundings
       CHECK(reduce(backend, float_data.data(), n, 1e30f, Minimum{}) ==
             std::accumulate(floats.begin(), floats.end(), 1e30f, Minimum{}));
 
@@ -244,7 +250,8 @@ TEST_CASE("bands cover the range once, within their limit, and stop when told") 
   }
   int bands = 0;
   CHECK_FALSE(for_each_band(
-      Backend::cpu, 100, 1, 1, 1, [&](std::size_t, std::size_t) { ++bands; }, [&](double) { return bands < 4; }));
+      Backend::cpu, 100, 1, 1, 1, [&](std::size_t, std::size_t) { ++bands; },
+      [&](double) { return bands < 4; }));
   CHECK(bands == 4);
 }
 
@@ -264,8 +271,9 @@ struct Fault {
 };
 }  // namespace
 
-// Catches: errors of the device that pass unseen. It spoils the process's device, so it runs alone and last: [.fault]
-TEST_CASE("an error on the device becomes an exception that names call and place", "[.fault]") {
+// Catches: errors of the device that pass unseen. It spoils the device for its process: under ctest each case
+// has one.
+TEST_CASE("an error on the device becomes an exception that names call and place", "[fault]") {
   require_cuda();
   try {
     for_each(Backend::cuda, 100, Fault{nullptr});
@@ -280,8 +288,8 @@ TEST_CASE("an error on the device becomes an exception that names call and place
   }
 }
 
-// Catches: a primitive that costs more than the loop it replaces. On a busy machine a turn can be slow, so the best of
-// many counts, and what is compared takes turns.
+// Catches: a primitive that costs more than the loop it replaces. On a busy machine a turn can be slow, so
+// the best of many counts, and what is compared takes turns.
 TEST_CASE("on the CPU no primitive is slower than a serial loop at 10^6 elements", "[timing]") {
   constexpr std::size_t n = 1000000;
   const auto values = random_values<std::uint32_t>(n, 1, 0xffffffffu);
@@ -297,7 +305,10 @@ TEST_CASE("on the CPU no primitive is slower than a serial loop at 10^6 elements
     int turns;
     std::function<void()> ours, serial;
   } rows[] = {
-      {"for_each", 60, [&] { for_each(Backend::cpu, n, Square{values.data(), out.data()}, 1 << 15); },
+      {"for_each", 60,
+       [&] {
+         for_each(Backend::cpu, n, Square{values.data(), out.data()}, 1 << 15);
+       },
        [&] {
          for (std::size_t i = 0; i < n; ++i) out[i] = values[i] * values[i];
        }},
@@ -317,10 +328,12 @@ TEST_CASE("on the CPU no primitive is slower than a serial loop at 10^6 elements
        },
        [&] {
          for (std::size_t i = 0; i < n; ++i) items[i] = {values[i], payload[i]};
-         std::stable_sort(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.key < b.key; });
+         std::stable_sort(items.begin(), items.end(),
+                          [](const Item& a, const Item& b) { return a.key < b.key; });
          for (std::size_t i = 0; i < n; ++i) keys[i] = items[i].key, payload[i] = items[i].value;
        }},
-      {"compact", 60, [&] { sink += static_cast<std::uint32_t>(compact(Backend::cpu, flags.data(), n, out.data())); },
+      {"compact", 60,
+       [&] { sink += static_cast<std::uint32_t>(compact(Backend::cpu, flags.data(), n, out.data())); },
        [&] {
          std::uint32_t count = 0;
          for (std::size_t i = 0; i < n; ++i)

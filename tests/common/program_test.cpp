@@ -1,4 +1,5 @@
-// The contract that every chapter's program keeps, seen from outside: exit codes, one line, nothing half-written.
+// The contract that every chapter's program keeps, seen from outside: exit codes, one line, nothing
+// half-written.
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -39,7 +40,9 @@ struct Folder {
   }
   ~Folder() { fs::remove_all(path); }
   fs::path operator/(const std::string& name) const { return path / name; }
-  std::size_t files() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), {})); }
+  std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), {}));
+  }
 };
 
 std::string program() {
@@ -47,14 +50,15 @@ std::string program() {
   return other ? other : TRILHA_PROGRAM;
 }
 
-/// Runs the program in the folder; {} in the arguments stands for the folder. A signal may be sent after a while.
+/// Runs the program in the folder; {} in the arguments stands for the folder. A signal may be sent after a
+/// while.
 Result run(const Folder& folder, std::string arguments, double interrupt_after = -1) {
   for (std::size_t at; (at = arguments.find("{}")) != std::string::npos;)
     arguments.replace(at, 2, "'" + folder.path.string() + "'");
   const fs::path out = fs::temp_directory_path() / ("trilha_out" + std::to_string(getpid()));
   const fs::path err = fs::temp_directory_path() / ("trilha_err" + std::to_string(getpid()));
-  const std::string command =
-      "cd '" + folder.path.string() + "' && exec '" + program() + "' " + arguments + " >" + out.string() + " 2>" + err.string();
+  const std::string command = "cd '" + folder.path.string() + "' && exec '" + program() + "' " + arguments +
+                              " >" + out.string() + " 2>" + err.string();
   const pid_t child = fork();
   if (child == 0) {
     execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
@@ -72,7 +76,9 @@ Result run(const Folder& folder, std::string arguments, double interrupt_after =
   return result;
 }
 
-std::size_t lines(const std::string& text) { return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')); }
+std::size_t lines(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
 
 void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 
@@ -80,7 +86,8 @@ const char* const triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
 }  // namespace
 
-// Catches: a refusal without a reason, in more than a line, with the wrong code, or that leaves a file behind.
+// Catches: a refusal without a reason, in more than a line, with the wrong code, or that leaves a file
+// behind.
 TEST_CASE("what is refused is refused in one line, with its exit code, and nothing is written") {
   Folder folder;
   write(folder / "good.obj", triangle);
@@ -158,8 +165,9 @@ TEST_CASE("CUDA that is asked for and absent is exit code 3") {
 TEST_CASE("a disk that is full leaves no half image") {
   Folder folder;
   write(folder / "good.obj", triangle);
-  const std::string limited = "sh -c 'trap \"\" XFSZ; ulimit -f 1; cd \"" + folder.path.string() + "\"; \"" + program() +
-                              "\" --scene good.obj --shading depth --size 640x480 --output big.hdr' >/dev/null 2>&1";
+  const std::string limited =
+      "sh -c 'trap \"\" XFSZ; ulimit -f 1; cd \"" + folder.path.string() + "\"; \"" + program() +
+      "\" --scene good.obj --shading depth --size 640x480 --output big.hdr' >/dev/null 2>&1";
   const int status = std::system(limited.c_str());
   CHECK(WEXITSTATUS(status) == 1);
   CHECK(folder.files() == 1);
@@ -169,7 +177,8 @@ TEST_CASE("a disk that is full leaves no half image") {
 TEST_CASE("the JSON has the fixed names, and numbers that fit together") {
   Folder folder;
   write(folder / "good.obj", triangle);
-  const Result result = run(folder, "--scene good.obj --json --explain --size 64x48 --samples 2 --backend cpu --output a.png");
+  const Result result =
+      run(folder, "--scene good.obj --json --explain --size 64x48 --samples 2 --backend cpu --output a.png");
   REQUIRE(result.code == 0);
   const Json json = Json::parse(result.out);
   CHECK(json["chapter"] == "01_ray_casting");
@@ -181,7 +190,8 @@ TEST_CASE("the JSON has the fixed names, and numbers that fit together") {
   CHECK(json["samples"] == 2);
   CHECK(json["build_ms"] > 0);
   CHECK(json["render_ms"] > 0);
-  CHECK(json["mrays_per_s"].get<double>() * json["render_ms"].get<double>() == Approx(2 * 64 * 48 / 1e3).epsilon(1e-6));
+  CHECK(json["mrays_per_s"].get<double>() * json["render_ms"].get<double>() ==
+        Approx(2 * 64 * 48 / 1e3).epsilon(1e-6));
   CHECK(json["bytes"] > 64 * 48 * 16);
   CHECK(json["features"].is_array());
   CHECK(json["settings"]["test"] == "watertight");
@@ -195,7 +205,8 @@ TEST_CASE("the JSON has the fixed names, and numbers that fit together") {
 TEST_CASE("the same picture from any folder, any number of threads, any loop") {
   Folder folder;
   const auto image = [&](const std::string& flags) {
-    const Result result = run(folder, "--quiet --backend cpu --scene teapot --size 100x80 --output {}/i.hdr " + flags);
+    const Result result =
+        run(folder, "--quiet --backend cpu --scene teapot --size 100x80 --output {}/i.hdr " + flags);
     INFO(flags << result.err);
     REQUIRE(result.code == 0);
     return contents(folder / "i.hdr");

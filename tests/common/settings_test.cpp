@@ -37,8 +37,10 @@ TEST_CASE("a setting reads back what it shows, and refuses the rest") {
     settings["size"].set_text(shown);
     CHECK(size == value);
   }
-  for (const char* bad : {"", "x", "1x", "2.5", "nan", " 3"}) CHECK_THROWS_AS(settings["count"].set_text(bad), UsageError);
-  for (const char* bad : {"0", "11", "-5", "1e30"}) CHECK_THROWS_AS(settings["count"].set_text(bad), InputError);
+  for (const char* bad : {"", "x", "1x", "2.5", "nan", " 3"})
+    CHECK_THROWS_AS(settings["count"].set_text(bad), UsageError);
+  for (const char* bad : {"0", "11", "-5", "1e30"})
+    CHECK_THROWS_AS(settings["count"].set_text(bad), InputError);
   CHECK_THROWS_AS(settings["size"].set_text("inf"), InputError);
   CHECK_THROWS_AS(settings["fruit"].set_text("plum"), UsageError);
   CHECK(count == 10);

@@ -1,6 +1,6 @@
 #pragma once
-// Rays that start inside a closed mesh: each must hit it. The rays are those of the peers' measurements, so that the
-// rates can be compared; every structure of the course goes through the same trial.
+// Rays that start inside a closed mesh: each must hit it. The rays are those of the peers' measurements, so
+// that the rates can be compared; every structure of the course goes through the same trial.
 
 #include "chapters/01_ray_casting/error_bounds.h"
 #include "common/math/random.h"
@@ -10,8 +10,9 @@
 
 namespace trilha::testing {
 
-/// `anywhere`: from a cube of ±0.4 radii about the centre (inside an icosahedron), in a direction uniform in the cube ±1. The others: from
-/// a uniform point of the sphere of half the radius toward a uniform point of a random triangle's edge, or its vertex.
+/// `anywhere`: from a cube of ±0.4 radii about the centre (inside an icosahedron), in a direction uniform in
+/// the cube ±1. The others: from a uniform point of the sphere of half the radius toward a uniform point of a
+/// random triangle's edge, or its vertex.
 enum class Aim { anywhere, edges, vertices };
 
 /// A closed mesh whose vertices are at least `radius` from the centre. Pointers are to the backend.
@@ -21,19 +22,20 @@ struct ClosedMesh {
   std::uint32_t count;
   dvec3 centre;
   double radius;
-  bool check_inside;  ///< rounding may have moved the mesh over the origins: count only those inside, by winding number
+  bool check_inside;  ///< rounding may have moved the mesh over the origins: count only those inside, by
+                      ///< winding number
 };
 
 struct WatertightCounts {
-  std::uint64_t rays = 0;          ///< whose origin is inside
+  std::uint64_t rays = 0;  ///< whose origin is inside
   std::uint64_t misses = 0;
   std::uint64_t beyond_bound = 0;  ///< hits whose t is further from the exact one than the derived bound
   std::uint64_t unbounded = 0;     ///< hits for which the bound is infinite
   std::uint64_t wrong = 0;         ///< hits whose t is off by more than a hundredth, bound or not
 };
 
-/// How often the mesh winds around p: the solid angles of its triangles over 4π (van Oosterom & Strackee 1983).
-/// NaN where p lies on the surface.
+/// How often the mesh winds around p: the solid angles of its triangles over 4π (van Oosterom & Strackee
+/// 1983). NaN where p lies on the surface.
 TRILHA_HD inline double winding_number(const ClosedMesh& mesh, const dvec3& p) {
   double sum = 0;
   for (std::uint32_t i = 0; i < mesh.count; ++i) {
@@ -121,14 +123,15 @@ struct WatertightTrial {
 
 /// Runs at least `wanted` rays and adds up what became of them.
 template <class Test, class Structure>
-WatertightCounts watertight_trial(const Stream& stream, const Structure& structure, const ClosedMesh& mesh, Aim aim,
-                                  std::uint64_t seed, std::uint64_t wanted) {
+WatertightCounts watertight_trial(const Stream& stream, const Structure& structure, const ClosedMesh& mesh,
+                                  Aim aim, std::uint64_t seed, std::uint64_t wanted) {
   constexpr std::uint32_t batch = 16;
   const std::size_t n = (wanted + batch - 1) / batch;
   Buffer<std::uint32_t> counts(stream.backend(), 5 * n);
   std::uint32_t* data = counts.data();
   for_each(stream, n,
-           WatertightTrial<Structure, Test>{structure, mesh, aim, seed, batch, data, data + n, data + 2 * n, data + 3 * n, data + 4 * n},
+           WatertightTrial<Structure, Test>{structure, mesh, aim, seed, batch, data, data + n, data + 2 * n,
+                                            data + 3 * n, data + 4 * n},
            16);
   const auto total = [&](int k) -> std::uint64_t {
     return reduce(stream, data + static_cast<std::size_t>(k) * n, n, std::uint32_t{0}, Sum{});
