@@ -161,7 +161,7 @@ struct BaldwinWeber {
                              n / size[axis]};
     for (int r = 0; r < 3; ++r) {
       for (int k = 0; k < 3; ++k) out[4 * r + k] = static_cast<T>(rows[r][k]);
-      out[4 * r + 3] = static_cast<T>(-fused_dot(rows[r], origin));
+      out[4 * r + 3] = static_cast<T>(fused_dot(rows[r], -origin));
     }
   }
 
@@ -172,7 +172,7 @@ struct BaldwinWeber {
 
   template <class T>
   struct Measure {
-    T n_dot_d, t, u, v;
+    T against, t, u, v;  // against: how fast the ray comes towards the plane's front
   };
 
   template <class T>
@@ -185,8 +185,8 @@ struct BaldwinWeber {
     const Vec3<T>& o = ray.origin;
     const Vec3<T>& d = ray.direction;
     Measure<T> m;
-    m.n_dot_d = fused_dot(triangle.vector(8), d);
-    m.t = -row_times_point(triangle, 2, o) / m.n_dot_d;
+    m.against = fused_dot(triangle.vector(8), -d);  // not -fused_dot(…, d): see common/math/vector.h
+    m.t = row_times_point(triangle, 2, o) / m.against;
     const Vec3<T> p = {fma(m.t, d.x, o.x), fma(m.t, d.y, o.y), fma(m.t, d.z, o.z)};
     m.u = row_times_point(triangle, 0, p);
     m.v = row_times_point(triangle, 1, p);
@@ -200,7 +200,7 @@ struct BaldwinWeber {
 
   template <class T>
   TRILHA_HD static bool solve(const Measure<T>& m, const RayOf<T>&, NoRayConstants, Solution<T>& s) {
-    s = {m.t, m.u, m.v, m.n_dot_d < 0};
+    s = {m.t, m.u, m.v, m.against > 0};
     return may_hit(m);
   }
 };

@@ -28,7 +28,9 @@ using vec4 = Vec4<float>;
 using dvec3 = Vec3<double>;
 using uvec3 = Vec3<std::uint32_t>;
 
-/// a·b + c, rounded once, on every machine.
+/// a·b + c, rounded once, on every machine. Its value must not be negated: GCC makes −fma(a, b, c) one
+/// instruction, −(a·b) − c, whose zero has the other sign where the two cancel. Negate an argument of each
+/// product instead.
 template <class T>
 TRILHA_HD inline T fma(T a, T b, T c) {
   return std::fma(a, b, c);
