@@ -6,12 +6,21 @@
 
 namespace trilha::testing {
 
-void require_cuda() {
-  const std::string reason = why_unavailable(Backend::cuda);
-  if (reason.empty()) return;
+void skip(const std::string& reason) {
   std::printf("TRILHA SKIPPED: %s\n", reason.c_str());  // ctest looks for these words
   std::fflush(stdout);
-  std::exit(EXIT_SUCCESS);  // each test case is a process of its own under ctest
+  std::_Exit(EXIT_SUCCESS);  // each test case is a process of its own under ctest
+}
+
+void require_cuda() {
+  const std::string reason = why_unavailable(Backend::cuda);
+  if (!reason.empty()) skip(reason);
+}
+
+void require_meaningful_times() {
+#if defined(__SANITIZE_ADDRESS__)
+  skip("times mean nothing under sanitizers");
+#endif
 }
 
 std::vector<Backend> backends() {

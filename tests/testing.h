@@ -14,8 +14,14 @@
 
 namespace trilha::testing {
 
-/// Ends the test case as skipped, never as passed, where there is no CUDA device.
+/// Ends the test case as skipped, never as passed.
+[[noreturn]] void skip(const std::string& reason);
+
+/// Skips the test case where there is no CUDA device.
 void require_cuda();
+
+/// Skips the test case in a build whose sanitizers make times meaningless.
+void require_meaningful_times();
 
 /// The backends that exist here: for checks that hold on each machine. Skips nothing: a case about CUDA alone
 /// calls require_cuda.

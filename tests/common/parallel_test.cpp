@@ -291,6 +291,7 @@ TEST_CASE("an error on the device becomes an exception that names call and place
 // Catches: a primitive that costs more than the loop it replaces. On a busy machine a turn can be slow, so
 // the best of many counts, and what is compared takes turns.
 TEST_CASE("on the CPU no primitive is slower than a serial loop at 10^6 elements", "[timing]") {
+  require_meaningful_times();
   constexpr std::size_t n = 1000000;
   const auto values = random_values<std::uint32_t>(n, 1, 0xffffffffu);
   const auto flags = random_values<std::uint8_t>(n, 2, 2);
