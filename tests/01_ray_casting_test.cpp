@@ -172,7 +172,7 @@ std::vector<vec4> rendered(const Scene& scene, const RayCastingSettings& setting
   RayCaster caster(scene, settings, stream);
   Film film(stream, width, height);
   for (std::uint32_t k = 0; k < samples; ++k)
-    caster.add_sample(film, scene.camera, k, samples > 1, 7, [](double) { return true; });
+    caster.add_sample(film, scene.camera, k, samples > 1, 7, 100, [](double) { return true; });
   Buffer<vec4> pixels(backend, static_cast<std::size_t>(width) * height);
   copy(pixels.data(), backend, film.pixels(), backend, pixels.bytes(), stream);
   return pixels.to_vector(stream);
@@ -619,7 +619,7 @@ TEST_CASE("a render that is stopped keeps the pixels done so far") {
   RayCaster caster(scene, {}, Backend::cpu);
   Film film(Backend::cpu, 640, 640);
   int bands = 0;
-  CHECK_FALSE(caster.add_sample(film, scene.camera, 0, false, 0, [&](double) { return ++bands < 2; }));
+  CHECK_FALSE(caster.add_sample(film, scene.camera, 0, false, 0, 100, [&](double) { return ++bands < 2; }));
   CHECK(bands == 2);
   std::size_t done = 0;
   for (std::size_t i = 0; i < 640 * 640; ++i) done += film.pixels()[i].w == 1;

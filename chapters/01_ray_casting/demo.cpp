@@ -55,7 +55,7 @@ class RayCastingDemo final : public Demo {
     const double pixels = double(film.tiling().width) * film.tiling().height;
     double done = 0;
     const bool finished = caster_->add_sample(film, request.camera, request.index, request.jittered,
-                                              request.seed, [&](double fraction) {
+                                              request.seed, request.band_ms, [&](double fraction) {
                                                 done = fraction;
                                                 return request.keep_going(fraction);
                                               });

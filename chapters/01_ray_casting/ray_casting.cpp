@@ -212,7 +212,8 @@ void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
 }
 
 bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sample, bool jittered,
-                           std::uint64_t seed, const std::function<bool(double)>& keep_going) {
+                           std::uint64_t seed, double band_ms,
+                           const std::function<bool(double)>& keep_going) {
   const Tiling& tiling = film.tiling();
   const PinholeCamera pinhole =
       PinholeCamera::make(camera, static_cast<int>(tiling.width), static_cast<int>(tiling.height));
@@ -223,9 +224,8 @@ bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sampl
     hits_ = Buffer<Hit>(stream_.backend(), most_tiles * Tiling::tile_size);
   }
   const std::size_t first_tiles = stream_.backend() == Backend::cuda ? 256 : 2;
-  const double target_ms = 100;
   return for_each_band(
-      stream_, tiling.tiles(), first_tiles, most_tiles, target_ms,
+      stream_, tiling.tiles(), first_tiles, most_tiles, band_ms,
       [&](std::size_t first_tile, std::size_t end_tile) {
         const std::size_t begin = first_tile * Tiling::tile_size, end = end_tile * Tiling::tile_size;
         Timer rays_timer(stream_);

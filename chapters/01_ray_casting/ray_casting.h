@@ -267,10 +267,10 @@ class RayCaster {
   /// Throws InputError for a scene of more than 2³² − 2 triangles, DeviceError if the backend is missing.
   RayCaster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream);
 
-  /// Adds one sample to every pixel. keep_going(fraction) is asked after each band. Returns false if stopped
-  /// early.
+  /// Adds one sample to every pixel. keep_going(fraction) is asked after each band of about band_ms ms.
+  /// Returns false if stopped early.
   bool add_sample(Film& film, const Camera& camera, std::uint32_t sample, bool jittered, std::uint64_t seed,
-                  const std::function<bool(double)>& keep_going);
+                  double band_ms, const std::function<bool(double)>& keep_going);
 
   /// The nearest hit of each ray, by the settings' test and loop; both arrays lie on the stream's backend.
   void trace(const Ray* rays, Hit* hits, std::size_t n) const;

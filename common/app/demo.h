@@ -30,6 +30,7 @@ struct SampleRequest {
   std::uint32_t index;  ///< 0, 1, …
   bool jittered;        ///< anywhere in the pixel, or through its centre
   std::uint64_t seed;
+  double band_ms;  ///< about how long work may go on before keep_going is asked again
   /// Asked now and then with the fraction done; false means stop.
   std::function<bool(double)> keep_going;
 };

@@ -25,6 +25,10 @@ double milliseconds_since(Clock::time_point start) {
 
 void warn(const std::string& text) { std::cerr << "warning: " << text << "\n"; }
 
+/// How long a band of the image may take: far below the seconds after which a driver ends a kernel, soon
+/// enough for Ctrl-C, and long against the end of a launch, when processors run out of work.
+constexpr double band_ms = 400;
+
 /// What one run did.
 struct Outcome {
   double build_ms = 0, render_ms = 0, rays = 0;
@@ -85,7 +89,7 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
     };
     const bool jittered = timed || most > 1;
     const bool finished = demo.add_sample(film, {scene.camera, static_cast<std::uint32_t>(outcome.samples),
-                                                 jittered, options.seed, keep_going});
+                                                 jittered, options.seed, band_ms, keep_going});
     outcome.stopped = !finished;
     if (!finished) break;
     if (progress.cancelled()) {
