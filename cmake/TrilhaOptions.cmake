@@ -23,11 +23,20 @@ elseif(TRILHA_CPU_FLAGS)
   list(APPEND TRILHA_CXX_FLAGS ${TRILHA_CPU_FLAGS})
 endif()
 if(TRILHA_SANITIZE)
-  list(APPEND TRILHA_CXX_FLAGS -fsanitize=${TRILHA_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  list(APPEND TRILHA_CXX_FLAGS -fsanitize=${TRILHA_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer
+       -Wno-maybe-uninitialized)  # GCC 12 warns of its own std::function under sanitizers
+  set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g1")
   add_link_options(-fsanitize=${TRILHA_SANITIZE})
 endif()
 set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
 
+string(TOUPPER "${TRILHA_CUDA}" TRILHA_CUDA)
+if(NOT TRILHA_CUDA MATCHES "^(AUTO|ON|OFF)$")
+  message(FATAL_ERROR "TRILHA_CUDA is '${TRILHA_CUDA}'; say AUTO, ON or OFF")
+endif()
+if(TRILHA_SANITIZE AND NOT TRILHA_CUDA STREQUAL "OFF")
+  message(FATAL_ERROR "TRILHA_SANITIZE is for the CPU code alone: say -DTRILHA_CUDA=OFF with it")
+endif()
 set(TRILHA_HAS_CUDA OFF)
 if(NOT TRILHA_CUDA STREQUAL "OFF")
   find_program(TRILHA_NVCC nvcc HINTS ENV CUDACXX ENV CUDA_HOME ENV CUDA_PATH PATH_SUFFIXES bin

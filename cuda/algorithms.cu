@@ -13,8 +13,6 @@
 namespace trilha::cuda {
 namespace {
 
-cudaStream_t as_stream(void* stream) { return static_cast<cudaStream_t>(stream); }
-
 /// CUB's calls come in twos: the first says how much scratch memory the second needs. The scratch is freed
 /// when the call returns; freeing waits for the device, so it is safe.
 template <class Call>

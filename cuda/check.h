@@ -17,9 +17,12 @@ struct CudaError : std::runtime_error {
 inline void check(cudaError_t result, const char* call,
                   std::source_location where = std::source_location::current()) {
   if (result == cudaSuccess) return;
+  (void)cudaGetLastError();  // said here, not once more by the next launch
   throw CudaError(std::string(where.file_name()) + ":" + std::to_string(where.line()) + ": " + call + ": " +
                   cudaGetErrorName(result) + ", " + cudaGetErrorString(result));
 }
+
+inline cudaStream_t as_stream(void* stream) { return static_cast<cudaStream_t>(stream); }
 
 }  // namespace trilha::cuda
 

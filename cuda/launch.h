@@ -25,7 +25,7 @@ void launch(void* stream, std::size_t begin, std::size_t end, const Pass& pass, 
   for (std::size_t first = begin; first < end; first += most) {
     const std::size_t last = end - first > most ? first + most : end;
     const auto blocks = static_cast<unsigned>((last - first + block_size - 1) / block_size);
-    pass_kernel<<<blocks, block_size, 0, static_cast<cudaStream_t>(stream)>>>(first, last, pass);
+    pass_kernel<<<blocks, block_size, 0, as_stream(stream)>>>(first, last, pass);
     check(cudaGetLastError(), typeid(Pass).name(), where);
   }
 }

@@ -1,11 +1,11 @@
 #include "cuda/runtime.h"
 
+#include <new>
+
 #include "cuda/check.h"
 
 namespace trilha::cuda {
 namespace {
-
-cudaStream_t as_stream(void* stream) { return static_cast<cudaStream_t>(stream); }
 
 __global__ void nothing() {}
 
@@ -52,7 +52,12 @@ void synchronize(void* stream) { TRILHA_CHECK(cudaStreamSynchronize(as_stream(st
 
 void* allocate(std::size_t bytes) {
   void* memory = nullptr;
-  TRILHA_CHECK(cudaMalloc(&memory, bytes));
+  const cudaError_t result = cudaMalloc(&memory, bytes);
+  if (result == cudaErrorMemoryAllocation) {
+    (void)cudaGetLastError();  // it would be taken for the next launch's
+    throw std::bad_alloc();
+  }
+  check(result, "cudaMalloc");
   return memory;
 }
 

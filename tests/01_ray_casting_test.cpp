@@ -220,7 +220,7 @@ TEST_CASE("t stays within the derived bound of the same test in 80-bit arithmeti
     const std::size_t n = effort(280000);
     for (std::size_t i = 0; i < n; ++i) {
       Random random(2, i);
-      const int kind = static_cast<int>(i % 7);  // ordinary to axis-aligned; the rest leaves float's range
+      const int kind = static_cast<int>(i % (pair_kinds - 1));  // all but NaN and infinity
       const Pair p = make_pair(random, kind);
       Solution<float> s{};
       Solution<Wide> exact{};
@@ -250,7 +250,7 @@ TEST_CASE("t stays within the derived bound of the same test in 80-bit arithmeti
     }
     std::printf("  %-16s %zu compared, largest error / bound %.3f, unbounded %zu, hit or miss differs %zu\n",
                 name_of<Test>(), compared, tightest, unbounded, disagreements);
-    CHECK(compared > n / 3);
+    CHECK(compared > n / 5);
     CHECK(tightest > 0.02);  // a bound a hundred times too wide would say nothing
     CHECK(far <= n / 100000);
   });
@@ -276,26 +276,33 @@ TEST_CASE("no input, however hostile, makes a hit outside the interval") {
   });
 }
 
-// Catches: an edge function whose sign is wrong where its value cancels, overflows or underflows.
-TEST_CASE("edge functions have the sign of exact arithmetic, down to zero") {
-  Random random(4);
-  std::size_t zeros = 0;
-  for (int k = 0; k < 1000000; ++k) {
-    const auto small = [&] { return static_cast<float>(static_cast<int>(random.index(4097)) - 2048); };
-    float a = small(), b = small(), c = small(), d = small();
-    if (a == 0) a = 1;
-    if (k % 3 == 0) c = a, d = b;                        // exactly zero
-    if (k % 3 == 1) c = std::nextafter(a, 1e9f), d = b;  // nearly zero
-    const __int128 scale = 1 << 24;
-    const auto exact =
-        static_cast<__int128>(double(a) * double(scale)) * static_cast<__int128>(double(b) * double(scale)) -
-        static_cast<__int128>(double(c) * double(scale)) * static_cast<__int128>(double(d) * double(scale));
-    const float value = difference_of_products(a, b, c, d);
-    zeros += exact == 0;
-    REQUIRE((value > 0) == (exact > 0));
-    REQUIRE((value < 0) == (exact < 0));
-  }
-  CHECK(zeros > 300000);
+// Catches: an edge function whose sign is wrong where its value cancels, overflows or underflows; the redo in
+// double left out. The triangles lie on a lattice, many with an edge or a vertex on the ray; integers decide.
+TEST_CASE("the watertight test decides as exact arithmetic does, at any scale") {
+  std::size_t hits = 0, on_border = 0;
+  for (const float scale : {0x1p-70f, 0x1p-60f, 1.0f, 0x1p40f, 0x1p55f, 0x1p62f})
+    for (std::size_t i = 0; i < 60000; ++i) {
+      Random random(4, i);
+      std::int64_t x[3], y[3];
+      vec3 p[3];
+      const std::uint32_t range = i % 2 == 0 ? 4 : 60000;
+      for (int k = 0; k < 3; ++k) {
+        x[k] = static_cast<std::int64_t>(random.index(2 * range + 1)) - range;
+        y[k] = static_cast<std::int64_t>(random.index(2 * range + 1)) - range;
+        p[k] = vec3(float(x[k]), float(y[k]), float(1 + random.index(5))) * scale;
+      }
+      Ray ray;  // along z, through the origin
+      const auto edge = [&](int a, int b) { return x[a] * y[b] - y[a] * x[b]; };
+      const std::int64_t u = edge(1, 2), v = edge(2, 0), w = edge(0, 1);
+      const bool inside = ((u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0)) && u + v + w != 0;
+      Solution<float> s{};
+      if (intersect<Watertight>(p[0], p[1], p[2], ray, s) != inside)
+        FAIL_CHECK("scale " << scale << ", triangle " << i << ": exactly " << (inside ? "hit" : "missed"));
+      hits += inside;
+      on_border += inside && (u == 0 || v == 0 || w == 0);
+    }
+  CHECK(hits > 50000);
+  CHECK(on_border > 20000);
 }
 
 // Catches: any of the three loop orders that skips, repeats or reorders triangles; block ends; mixed ray
@@ -392,14 +399,14 @@ TEST_CASE("the watertight test misses nothing from inside closed meshes, and kee
   for (const Backend backend : backends()) {
     const Stream stream(backend);
     if (factor > 10 && backend == Backend::cpu) continue;  // 10⁹ rays are for the device
-    const std::uint64_t wanted = 8500 * factor;  // 10 cases × 4 meshes × 3 aims: 10⁶ rays in all
+    const std::uint64_t wanted = 9400 * factor;  // 10 cases × 4 meshes × 3 aims: 10⁶ rays in all
     std::printf("  %s: misses / beyond the bound, of %llu rays a cell\n", name(backend),
                 (unsigned long long)wanted);
     WatertightCounts total;
     std::uint64_t others[3] = {};
     for (const Case& c : cases) {
       WatertightCounts row;
-      std::uint64_t row_others[3] = {};
+      std::uint64_t row_others[3] = {}, row_other_rays[3] = {};
       for (const auto& [mesh_name, make] : meshes) {
         const dvec3 centre = glm::normalize(dvec3(148376, 1234, -223423)) * (c.offset * c.size);
         const Mesh mesh = make(c.size, centre);
@@ -427,21 +434,22 @@ TEST_CASE("the watertight test misses nothing from inside closed meshes, and kee
               CHECK(counts.rays > 0);
               CHECK(counts.misses == 0);
               CHECK(counts.beyond_bound == 0);
+              CHECK(counts.wrong == 0);
             } else {
-              row_others[other++] +=
-                  (counts.misses + counts.wrong) * 10000000 / std::max<std::uint64_t>(counts.rays, 1) / 12;
+              row_others[other] += counts.misses + counts.wrong;
+              row_other_rays[other++] += counts.rays;
             }
           });
         }
       }
       std::printf(
-          "    %-16s %10llu rays: watertight %llu misses, %llu beyond, %llu unbounded; missed or t off by 1 "
-          "%% in 10^7: plane "
-          "%llu, Moller-Trumbore %llu, Baldwin-Weber %llu\n",
+          "    %-16s %10llu rays: watertight %llu misses, %llu beyond, %llu unbounded; missed or t off by "
+          "1 %%, in 10^7: plane %.1f, Moller-Trumbore %.1f, Baldwin-Weber %.1f\n",
           c.name, (unsigned long long)row.rays, (unsigned long long)row.misses,
           (unsigned long long)row.beyond_bound, (unsigned long long)row.unbounded,
-          (unsigned long long)row_others[0], (unsigned long long)row_others[1],
-          (unsigned long long)row_others[2]);
+          1e7 * double(row_others[0]) / double(row_other_rays[0]),
+          1e7 * double(row_others[1]) / double(row_other_rays[1]),
+          1e7 * double(row_others[2]) / double(row_other_rays[2]));
       total.rays += row.rays, total.unbounded += row.unbounded;
       for (int k = 0; k < 3; ++k) others[k] += row_others[k];
     }
@@ -617,12 +625,12 @@ TEST_CASE("what is left out changes no pixel and saves memory") {
 TEST_CASE("a render that is stopped keeps the pixels done so far") {
   const Scene scene = scene_of(icosphere(2));
   RayCaster caster(scene, {}, Backend::cpu);
-  Film film(Backend::cpu, 640, 640);
+  Film film(Backend::cpu, 2048, 1024);
   int bands = 0;
   CHECK_FALSE(caster.add_sample(film, scene.camera, 0, false, 0, 100, [&](double) { return ++bands < 2; }));
   CHECK(bands == 2);
   std::size_t done = 0;
-  for (std::size_t i = 0; i < 640 * 640; ++i) done += film.pixels()[i].w == 1;
+  for (std::size_t i = 0; i < 2048 * 1024; ++i) done += film.pixels()[i].w == 1;
   CHECK(done >= 2 * Tiling::tile_size);
-  CHECK(done < 640 * 640);
+  CHECK(done < 2048 * 1024);
 }

@@ -15,7 +15,7 @@ namespace error_bounds {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double u = unit_roundoff<float>;
-constexpr double smallest = std::numeric_limits<float>::min();
+constexpr double subnormal = std::numeric_limits<float>::denorm_min();
 constexpr double largest = std::numeric_limits<float>::max();
 
 TRILHA_HD inline dvec3 absolute(const dvec3& v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
@@ -30,25 +30,29 @@ TRILHA_HD inline double quotient(double numerator_error, double denominator, dou
                                  double t) {
   const double left = std::fabs(denominator) - denominator_error;
   if (!(left > 0)) return infinity;
-  return (numerator_error + std::fabs(t) * denominator_error) / left * (1 + 2 * u) + 2 * u * std::fabs(t);
+  return (numerator_error + std::fabs(t) * denominator_error) / left * (1 + 2 * u) + 2 * u * std::fabs(t) +
+         subnormal;
 }
+
+TRILHA_HD inline double sum(const dvec3& v) { return v.x + v.y + v.z; }
 
 /// For tests whose numerator is n·(a − o) and whose denominator is n·d, up to sign, n = e1×e2: every term is
 /// a product of rounded differences, and passes 3 (the differences) + 2 (cross product) + 3 (dot product)
-/// roundings or fewer. Holds unless a term under- or overflows.
+/// roundings or fewer. Besides, each product or fma may lose up to half the smallest subnormal number to
+/// underflow: twice in a component of the cross product, which the dot product multiplies, and three times in
+/// the dot product. Holds in whichever order the three factors are multiplied, unless a product overflows.
 TRILHA_HD inline double by_triple_products(const dvec3& a, const dvec3& b, const dvec3& c,
                                            const RayOf<float>& ray, float t) {
-  const dvec3 e1 = b - a, e2 = c - a, s = a - dvec3(ray.origin), d(ray.direction);
-  const dvec3 n_sizes = cross_of_sizes(absolute(e1), absolute(e2));
-  const double denominator_sizes = dot(n_sizes, absolute(d)), numerator_sizes = dot(n_sizes, absolute(s));
-  const dvec3 n = glm::cross(e1, e2);
-  const double highest = max(max(n_sizes.x, n_sizes.y), n_sizes.z);
-  // what underflow adds stays below the γ terms while the largest terms are 2²⁴ times the smallest normal
-  // number
-  if (!(highest < largest && numerator_sizes < largest && denominator_sizes > smallest * 0x1p24 &&
-        (numerator_sizes > smallest * 0x1p24 || numerator_sizes == 0)))
-    return infinity;
-  return quotient(gamma<float>(9) * numerator_sizes, dot(n, d), gamma<float>(9) * denominator_sizes, t);
+  const dvec3 e1 = b - a, e2 = c - a, s = a - dvec3(ray.origin), d(ray.direction), n = glm::cross(e1, e2);
+  const dvec3 size1 = absolute(e1), size2 = absolute(e2), size_s = absolute(s), size_d = absolute(d);
+  const dvec3 n_sizes = cross_of_sizes(size1, size2);
+  const double numerator_sizes = dot(n_sizes, size_s), denominator_sizes = dot(n_sizes, size_d);
+  const double highest = max(max(sum(n_sizes), max(numerator_sizes, denominator_sizes)),
+                             max(sum(cross_of_sizes(size_d, size2)), sum(cross_of_sizes(size_s, size1))));
+  if (!(highest < largest)) return infinity;
+  const double lost = (2 * (sum(size1) + sum(size2)) + 3) * subnormal;
+  return quotient(gamma<float>(9) * numerator_sizes + lost + 2 * sum(size_s) * subnormal, dot(n, d),
+                  gamma<float>(9) * denominator_sizes + lost + 2 * sum(size_d) * subnormal, t);
 }
 
 }  // namespace error_bounds
@@ -93,7 +97,8 @@ TRILHA_HD inline double t_error_bound<BaldwinWeber>(const vec3& a, const vec3& b
                                  gamma<float>(4) * (dot(absolute(row), absolute(o)) + std::fabs(constant));
   const double denominator_error =
       dot(row_error, absolute(d)) + gamma<float>(4) * dot(absolute(row), absolute(d));
-  return quotient(numerator_error * (1 + 8 * u), dot(row, d), denominator_error * (1 + 8 * u), t);
+  return quotient(numerator_error * (1 + 8 * u) + (sum(absolute(o)) + 5) * subnormal, dot(row, d),
+                  denominator_error * (1 + 8 * u) + (sum(absolute(d)) + 3) * subnormal, t);
 }
 
 /// ẑ is the mean of the vertices' z, weighted by the edge functions. If those carry errors δᵢ, and z itself

@@ -1,5 +1,6 @@
 #include "chapters/01_ray_casting/ray_casting.h"
 
+#include <algorithm>
 #include <cmath>
 #include <type_traits>
 
@@ -33,8 +34,7 @@ PinholeCamera PinholeCamera::make(const Camera& camera, int width, int height) {
           vec3(glm::cross(forward, unit_right) * half_height)};
 }
 
-// ---- shading
-// --------------------------------------------------------------------------------------------------------
+// ---- shading -----------------------------------------------------------------
 
 namespace {
 
@@ -74,7 +74,7 @@ TRILHA_HD vec3 Shade<reads>::colour(const Ray& ray, const Hit& hit) const {
   if (shading == Shading::tests) return vec3(static_cast<float>(tested));
   if (!hit.found()) return shading == Shading::lambert ? vec3(0.015f, 0.02f, 0.03f) : vec3(0);
   vec3 normal(0), geometric(0);
-  if constexpr (reads != Reads::hit_alone) {
+  if (reads != Reads::hit_alone && (reads != Reads::everything || surface.triangles != nullptr)) {
     const uvec3 t = surface.triangles[hit.primitive];
     geometric = geometric_normal(surface.positions[t.x], surface.positions[t.y], surface.positions[t.z]);
     normal = geometric;
@@ -115,8 +115,7 @@ TRILHA_HD vec3 Shade<reads>::colour(const Ray& ray, const Hit& hit) const {
 
 namespace {
 
-// ---- building
-// -------------------------------------------------------------------------------------------------------
+// ---- building ----------------------------------------------------------------
 
 /// All meshes of a scene as one, with only those parts that are asked for.
 struct Parts {
@@ -164,7 +163,7 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
   const bool diffuse_needed = keep.materials || settings.shading == Shading::lambert;
   const Parts parts{reads_normals(settings) || keep.normals,
                     keep.texture_coordinates && scene.features.texture_coordinates,
-                    diffuse_needed && scene.features.materials};
+                    diffuse_needed && (scene.features.materials || keep.materials)};
   const Mesh mesh = united_mesh(scene, parts);
   positions_ = Buffer(stream_, mesh.positions);
   triangles_ = Buffer(stream_, mesh.triangles);
@@ -178,7 +177,7 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
   }
   with_test(settings_.test, [&](auto test) { prepare<decltype(test)>(); });
   stream_.synchronize();
-  if (!reads_surface(settings_) && !keep.surface && !keep.general_kernel) positions_ = {}, triangles_ = {};
+  if (!reads_surface(settings_) && !keep.surface) positions_ = {}, triangles_ = {};
 }
 
 template <class Test>
@@ -192,8 +191,7 @@ void RayCaster::prepare() {
            PrepareTriangles<Test>{positions_.data(), triangles_.data(), count_, lanes, numbers_.data()});
 }
 
-// ---- rendering
-// ------------------------------------------------------------------------------------------------------
+// ---- rendering ---------------------------------------------------------------
 
 void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
   with_test(settings_.test, [&](auto test) {
@@ -223,19 +221,22 @@ bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sampl
     rays_ = Buffer<Ray>(stream_.backend(), most_tiles * Tiling::tile_size);
     hits_ = Buffer<Hit>(stream_.backend(), most_tiles * Tiling::tile_size);
   }
-  const std::size_t first_tiles = stream_.backend() == Backend::cuda ? 256 : 2;
+  // Until the machine's speed is known, a band has as many tests as a slow one makes in a second.
+  const double first_tests = stream_.backend() == Backend::cuda ? 1e10 : 1e8;
+  const double tile_tests = static_cast<double>(Tiling::tile_size) * std::max(count_, 1u);
+  const double first_tiles = tiles_per_ms_ > 0 ? band_ms * tiles_per_ms_ : first_tests / tile_tests;
   return for_each_band(
-      stream_, tiling.tiles(), first_tiles, most_tiles, band_ms,
+      stream_, tiling.tiles(), static_cast<std::size_t>(std::clamp(first_tiles, 1.0, double(most_tiles))),
+      most_tiles, band_ms,
       [&](std::size_t first_tile, std::size_t end_tile) {
         const std::size_t begin = first_tile * Tiling::tile_size, end = end_tile * Tiling::tile_size;
-        Timer rays_timer(stream_);
+        Timer band_timer(stream_), rays_timer(stream_);
         for_each(stream_, {begin, end},
                  PrimaryRays{pinhole, tiling, begin, seed, sample, jittered, rays_.data()});
         times_.rays += rays_timer.milliseconds();
         Timer trace_timer(stream_);
         trace(rays_.data(), hits_.data(), end - begin);
         times_.trace += trace_timer.milliseconds();
-        tests_ += static_cast<double>(end - begin) * count_;
         Timer shade_timer(stream_);
         if (settings_.keep.general_kernel) {
           shade<Reads::everything>(begin, end, film, camera);
@@ -247,6 +248,8 @@ bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sampl
           shade<Reads::hit_alone>(begin, end, film, camera);
         }
         times_.shade += shade_timer.milliseconds();
+        tiles_per_ms_ =
+            static_cast<double>(end_tile - first_tile) / std::max(band_timer.milliseconds(), 1e-3);
       },
       keep_going);
 }

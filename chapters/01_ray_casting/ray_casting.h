@@ -14,8 +14,7 @@
 
 namespace trilha {
 
-// ---- the camera
-// -----------------------------------------------------------------------------------------------------
+// ---- the camera --------------------------------------------------------------
 
 /// A pinhole: every ray starts at the eye and goes through a point of the image plane at distance one.
 struct PinholeCamera {
@@ -39,8 +38,7 @@ struct PinholeCamera {
   }
 };
 
-// ---- the structure: no structure at all
-// ----------------------------------------------------------------------------
+// ---- the structure: no structure at all --------------------------------------
 
 /// Triangles as primitives: `count` of them, with Test::numbers numbers each, one triangle after the other.
 template <class Test_>
@@ -102,8 +100,7 @@ struct BruteForce {
   }
 };
 
-// ---- settings
-// -------------------------------------------------------------------------------------------------------
+// ---- settings ----------------------------------------------------------------
 
 enum class TriangleTest { plane, moller_trumbore, baldwin_weber, watertight };
 enum class Loop { plain, blocked };
@@ -153,8 +150,7 @@ decltype(auto) with_test(TriangleTest test, const Function& function) {
   return function(Watertight{});
 }
 
-// ---- the passes
-// -----------------------------------------------------------------------------------------------------
+// ---- the passes --------------------------------------------------------------
 
 /// Triangle i → the numbers that the test keeps of it, in groups of `lanes` triangles: number k of a group's
 /// triangles lies together. One lane is one triangle after the other. The last group is filled up with the
@@ -253,8 +249,7 @@ struct Shade {
   TRILHA_HD vec3 colour(const Ray& ray, const Hit& hit) const;
 };
 
-// ---- the caster
-// -----------------------------------------------------------------------------------------------------
+// ---- the caster --------------------------------------------------------------
 
 /// Milliseconds of each stage, summed over the samples.
 struct StageTimes {
@@ -279,8 +274,6 @@ class RayCaster {
   void set_one_sided(bool one_sided) { settings_.one_sided = one_sided; }
   const StageTimes& times() const { return times_; }
   std::uint32_t triangle_count() const { return count_; }
-  /// Triangles asked so far, all rays together.
-  double tests() const { return tests_; }
 
  private:
   template <class Test>
@@ -302,7 +295,7 @@ class RayCaster {
   Buffer<Ray> rays_;
   Buffer<Hit> hits_;
   StageTimes times_;
-  double tests_ = 0;
+  double tiles_per_ms_ = 0;  ///< of the last band
 };
 
 }  // namespace trilha

@@ -1,12 +1,14 @@
 #pragma once
-// Four ways to ask where a ray meets a triangle. Each test is a struct with the same three steps:
+// Four ways to ask where a ray meets a triangle. Each test is a struct with the same steps:
 //
-//   prepare    what is kept of a triangle, made once: `numbers` numbers
-//   measure    straight-line arithmetic, no branch, no decision; whole blocks of triangles go through it as
-//   vectors solve      for the few that may_hit lets pass: the decision, the divisions, t and the
-//   barycentrics
+// - prepare: what is kept of a triangle, made once; `numbers` numbers.
+// - constants: what is worked out of a ray, once for all triangles.
+// - measure: straight-line arithmetic, no branch, no decision; whole blocks of triangles go through it as
+// vectors.
+// - may_hit: whether the measure leaves a hit possible.
+// - solve: for the few that it does, the decision, the divisions, t and the barycentrics.
 //
-// and each is templated on its scalar, so that the reference in higher precision is the same code. All tests
+// All are templated on their scalar, so that the reference in higher precision is the same code. All tests
 // are two-sided and say which side was hit. Barycentric u belongs to vertex b and v to vertex c.
 
 #include "common/math/precision.h"

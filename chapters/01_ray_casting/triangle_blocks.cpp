@@ -39,7 +39,8 @@ inline void test_block(const Triangles<Test>& triangles, std::uint32_t block, co
 template <class Test>
 void trace_blocks(const Triangles<Test>& triangles, const Ray* rays, Hit* hits, std::size_t n) {
   using Constants = decltype(Test::constants(Ray{}));
-  const std::uint32_t blocks = (triangles.count + block_lanes - 1) / block_lanes;
+  const auto blocks =
+      static_cast<std::uint32_t>((std::size_t{triangles.count} + block_lanes - 1) / block_lanes);
   constexpr std::uint32_t chunk = chunk_bytes / (block_lanes * Test::numbers * sizeof(float));
   const std::size_t batches = (n + batch - 1) / batch;
   tbb::parallel_for(std::size_t{0}, batches, [&](std::size_t b) {

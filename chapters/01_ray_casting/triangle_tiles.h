@@ -85,7 +85,8 @@ __global__ void __launch_bounds__(tile_threads)
     if (__syncthreads_and(agreed)) turn = wanted;
   }
 
-  for (std::uint32_t begin = 0; begin < triangles.count; begin += tile_triangles) {
+  for (std::size_t first_triangle = 0; first_triangle < triangles.count; first_triangle += tile_triangles) {
+    const auto begin = static_cast<std::uint32_t>(first_triangle);
     const std::uint32_t count = min(triangles.count - begin, static_cast<std::uint32_t>(tile_triangles));
     __syncthreads();
     for (std::uint32_t k = threadIdx.x; k < count * Test::numbers; k += tile_threads) {
@@ -112,8 +113,7 @@ void trace_tiles(const Stream& stream, const Triangles<Test>& triangles, const R
   if (n == 0) return;
   constexpr std::size_t rays_a_block = tile_threads * rays_a_thread;
   const auto blocks = static_cast<unsigned>((n + rays_a_block - 1) / rays_a_block);
-  trace_tiles_kernel<<<blocks, tile_threads, 0, static_cast<cudaStream_t>(stream.native())>>>(triangles, rays,
-                                                                                              hits, n);
+  trace_tiles_kernel<<<blocks, tile_threads, 0, cuda::as_stream(stream.native())>>>(triangles, rays, hits, n);
   cuda::check(cudaGetLastError(), "trace_tiles_kernel");
 }
 

@@ -69,12 +69,10 @@ void add_settings(CLI::App& app, const Settings& settings) {
     const std::string flag = "--" + setting.name;
     const std::string group = "Settings of this chapter";
     if (setting.kind == Setting::Kind::flag) {
-      app.add_flag_callback(
-             flag, [&setting] { setting.put(1); }, setting.help)
+      app.add_flag_function(
+             flag + ",!--no-" + setting.name, [&setting](std::int64_t n) { setting.put(n > 0 ? 1 : 0); },
+             setting.help)
           ->group(group);
-      app.add_flag_callback(
-             "--no-" + setting.name, [&setting] { setting.put(0); }, "")
-          ->group("");
       continue;
     }
     std::string help = setting.help + " [" + setting.text() + "]";

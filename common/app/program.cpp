@@ -80,7 +80,7 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
   if (timed) progress.stop_after(options.seconds);
   const auto start = Clock::now();
   double shown = 0;
-  for (; outcome.samples < most && !outcome.stopped; ++outcome.samples) {
+  for (; outcome.samples < most; ++outcome.samples) {
     const auto keep_going = [&](double fraction) {
       const double done = timed ? progress.seconds() : outcome.samples + fraction;
       progress.advance(done - shown);
@@ -90,14 +90,13 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
     const bool jittered = timed || most > 1;
     const bool finished = demo.add_sample(film, {scene.camera, static_cast<std::uint32_t>(outcome.samples),
                                                  jittered, options.seed, band_ms, keep_going});
-    outcome.stopped = !finished;
     if (!finished) break;
     if (progress.cancelled()) {
       ++outcome.samples;
-      outcome.stopped = outcome.samples < most;
       break;
     }
   }
+  outcome.stopped = interrupted() && outcome.samples < most;
   stream.synchronize();
   outcome.render_ms = milliseconds_since(start);
   outcome.rays = demo.rays();
@@ -113,8 +112,8 @@ double median(std::vector<double> values) {
 
 /// Measures each omission on an image small enough to take a tenth of a second: five turns of kept and left
 /// out.
-std::vector<Saving> measure(Demo& demo, const Scene& scene, const Stream& stream, Options options,
-                            const Outcome& outcome) {
+void measure(Demo& demo, const Scene& scene, const Stream& stream, Options options, const Outcome& outcome,
+             std::vector<Saving>& savings) {
   const double affordable = std::max(1024.0, 1e5 * outcome.mrays_per_s());
   const double scale = std::min(1.0, std::sqrt(affordable / (double(options.width) * options.height)));
   options.width = std::max(1, static_cast<int>(options.width * scale));
@@ -122,18 +121,17 @@ std::vector<Saving> measure(Demo& demo, const Scene& scene, const Stream& stream
   options.samples = 1;
   options.seconds = 0;
   options.quiet = true;
-  std::vector<Saving> savings;
-  for (Omission& omission : demo.omissions()) {
+  for (Saving& saving : savings) {
+    const Omission& omission = saving.omission;
     std::vector<double> ms[2];
     double bytes[2] = {};
     for (int turn = 0; turn < 6 && !interrupted(); ++turn)
       for (const bool kept : {true, false}) {
         omission.keep(kept);
         Film film(stream, options.width, options.height);
-        const std::size_t before = live_bytes(stream.backend());
         Outcome run = build(demo, scene, stream);
         render(demo, scene, stream, options, film, run);
-        bytes[kept] = static_cast<double>(live_bytes(stream.backend())) - static_cast<double>(before);
+        bytes[kept] = static_cast<double>(live_bytes(stream.backend()));
         if (turn == 0) continue;  // the warm-up
         double total = 0;
         for (const std::string& stage : omission.stages) {
@@ -142,10 +140,10 @@ std::vector<Saving> measure(Demo& demo, const Scene& scene, const Stream& stream
         }
         ms[kept].push_back(total);
       }
-    if (ms[0].size() < 5 || ms[1].size() < 5) break;  // interrupted
-    savings.push_back({omission, bytes[true] - bytes[false], median(ms[true]) - median(ms[false])});
+    if (ms[0].size() < 5 || ms[1].size() < 5) return;  // interrupted: the rest stays unmeasured
+    saving.bytes = bytes[true] - bytes[false];
+    saving.ms = median(ms[true]) - median(ms[false]);
   }
-  return savings;
 }
 
 std::string with_unit(double bytes) {
@@ -160,8 +158,8 @@ std::string with_unit(double bytes) {
   return text;
 }
 
-void print_text(const Demo& demo, const Scene& scene, const Stream& stream, const Options& options,
-                const Outcome& outcome, const std::vector<Saving>& savings) {
+void print_text(const Scene& scene, const Stream& stream, const Options& options, const Outcome& outcome,
+                const std::vector<Saving>& savings) {
   const auto line = [](const char* what) -> std::ostream& {
     std::cout << what << std::string(12 - std::string(what).size(), ' ');
     return std::cout;
@@ -193,7 +191,6 @@ void print_text(const Demo& demo, const Scene& scene, const Stream& stream, cons
     std::cout << "\n";
   }
   if (!options.explain && !savings.empty()) line("") << "(--explain says why, and measures what it saved)\n";
-  (void)demo;
 }
 
 void print_json(const Demo& demo, const Settings& settings, const Scene& scene, const Stream& stream,
@@ -252,13 +249,13 @@ int run(int argc, char** argv, Demo& demo) {
     print_scenes();
     return 0;
   }
+  catch_interrupts();
   set_thread_count(options.threads);
   check_can_write(options.output);
   const Stream stream = choose_backend(options);
   const Scene scene = load(options);
   for (const std::string& warning : scene.warnings) warn(warning);
 
-  catch_interrupts();
   Outcome outcome = build(demo, scene, stream);
   std::vector<Saving> savings;
   for (const Omission& omission : demo.omissions()) savings.push_back({omission, {}, {}});
@@ -267,12 +264,14 @@ int run(int argc, char** argv, Demo& demo) {
     render(demo, scene, stream, options, film, outcome);
     write_image(options.output, demo.develop(film, stream));
   }
-  if (options.explain) savings = measure(demo, scene, stream, options, outcome);
+  if (options.explain) measure(demo, scene, stream, options, outcome, savings);
   if (options.json)
     print_json(demo, settings, scene, stream, options, outcome, savings);
   else if (!options.quiet)
-    print_text(demo, scene, stream, options, outcome, savings);
-  if (outcome.stopped && interrupted()) warn("stopped by request: the image holds what was done by then");
+    print_text(scene, stream, options, outcome, savings);
+  if (outcome.samples == 0 && !outcome.stopped)
+    warn("--time was too short for one sample a pixel: the image holds what was done by then");
+  if (outcome.stopped) warn("stopped by request: the image holds what was done by then");
   std::cout.flush();
   if (!std::cout) throw InputError("standard output: cannot be written; is there room for it?");
   return 0;

@@ -86,9 +86,15 @@ float srgb_encoded(float light) {
   return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f;
 }
 
+float srgb_decoded(float display) {
+  const float x = display > 0 ? std::min(display, 1.0f) : 0.0f;
+  return x <= 0.04045f ? x / 12.92f : std::pow((x + 0.055f) / 1.055f, 2.4f);
+}
+
 void check_can_write(const std::string& path) {
   const std::string type = extension(path);
-  if (type != ".png" && type != ".hdr" && !fs::is_character_file(path))
+  std::error_code unknown;
+  if (type != ".png" && type != ".hdr" && !fs::is_character_file(path, unknown))
     refuse(path, type.empty() ? "it has no extension that says what to write"
                               : "'" + type + "' is no known image type");
   WholeFile attempt(path);
@@ -99,7 +105,11 @@ void write_image(const std::string& path, const Image& image) {
   std::string bytes;
   int written = 0;
   if (extension(path) == ".hdr") {
-    written = stbi_write_hdr_to_func(append, &bytes, image.width, image.height, 3, &image.pixels[0].x);
+    std::vector<vec3> light = image.pixels;
+    if (image.encoding == Encoding::display)
+      for (vec3& pixel : light)
+        for (int c = 0; c < 3; ++c) pixel[c] = srgb_decoded(pixel[c]);
+    written = stbi_write_hdr_to_func(append, &bytes, image.width, image.height, 3, &light[0].x);
   } else {
     std::vector<unsigned char> encoded(3 * count);
     for (std::size_t i = 0; i < count; ++i)

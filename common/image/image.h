@@ -21,6 +21,8 @@ struct Image {
 
 /// The sRGB transfer function (IEC 61966-2-1) of one channel; the argument is clamped to [0, 1], NaN is 0.
 float srgb_encoded(float light);
+/// Its inverse.
+float srgb_decoded(float display);
 
 /// Is the path a name that write_image knows (.png, .hdr), in a folder that can be written to? Throws
 /// InputError if not: said before an hour of rendering rather than after.

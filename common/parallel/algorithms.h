@@ -43,7 +43,7 @@ void exclusive_scan(const Stream& stream, const std::uint32_t* values, std::uint
 void exclusive_scan(const Stream& stream, const std::uint64_t* values, std::uint64_t* sums, std::size_t n);
 
 /// Sorts the keys in place, ascending, and moves the values with them; equal keys keep their order. The keys
-/// must be below 2^key_bits; on the device fewer bits take less time. n below 2³².
+/// must be below 2^key_bits; on the device fewer bits take less time. n at most 2³².
 void sort_by_key(const Stream& stream, std::uint32_t* keys, std::uint32_t* values, std::size_t n,
                  int key_bits = 32);
 void sort_by_key(const Stream& stream, std::uint64_t* keys, std::uint32_t* values, std::size_t n,

@@ -147,7 +147,6 @@ void fill_bytes(const Stream& stream, void* memory, unsigned char value, std::si
 
 std::size_t live_bytes(Backend backend) { return account(backend).live; }
 std::size_t peak_bytes(Backend backend) { return account(backend).peak; }
-void reset_peak_bytes(Backend backend) { account(backend).peak = account(backend).live.load(); }
 
 struct Timer::State {
   Stream stream;

@@ -48,8 +48,8 @@ class Stream {
   std::shared_ptr<void> native_;
 };
 
-/// Uninitialised memory of the backend, aligned to 256 bytes; null for 0 bytes. Throws std::bad_alloc on the
-/// CPU and CudaError on the device where there is not enough.
+/// Uninitialised memory of the backend, aligned to 256 bytes; null for 0 bytes. Throws std::bad_alloc where
+/// there is not enough.
 void* allocate(Backend backend, std::size_t bytes);
 void deallocate(Backend backend, void* memory, std::size_t bytes) noexcept;
 
@@ -61,10 +61,9 @@ void copy(void* to, Backend to_backend, const void* from, Backend from_backend, 
 /// Sets every byte, in the stream's order.
 void fill_bytes(const Stream& stream, void* memory, unsigned char value, std::size_t bytes);
 
-/// Bytes of the backend that buffers hold now, and the most they held since the last reset_peak_bytes.
+/// Bytes of the backend that buffers hold now, and the most they ever held.
 std::size_t live_bytes(Backend backend);
 std::size_t peak_bytes(Backend backend);
-void reset_peak_bytes(Backend backend);
 
 /// Measures the time that work in a stream takes: by CUDA events on a device, by the steady clock on the CPU.
 class Timer {

@@ -26,12 +26,9 @@ bool has_assets(const fs::path& folder) {
 
 /// The fetched file; empty where there is none.
 fs::path bunny_file() {
-  const fs::path root = root_folder();
-  for (const char* name : {"assets/cache/bunny/bunny.obj", ".gpu/scenes/bunny.obj"}) {
-    std::error_code error;
-    if (fs::is_regular_file(root / name, error)) return root / name;
-  }
-  return {};
+  const fs::path file = root_folder() / "assets/cache/bunny/bunny.obj";
+  std::error_code error;
+  return fs::is_regular_file(file, error) ? file : fs::path();
 }
 
 Scene bunny() {

@@ -340,8 +340,10 @@ void check_materials(const std::string& path, std::string& text) {
       {"Ni", 1}, {"Ns", 1}, {"d", 1},   {"Tr", 1},    {"Pr", 1},     {"Pm", 1},
       {"Ps", 1}, {"Pc", 1}, {"Pcr", 1}, {"aniso", 1}, {"anisor", 1}, {"illum", 1}};
   Statements statements(text);
+  bool any = false;
   while (statements.next()) {
     const std::string_view keyword = statements.word();
+    any |= keyword == "newmtl";
     const auto found = numbers_of.find(keyword);
     if (found == numbers_of.end()) continue;
     const std::size_t count = checked_numbers(statements, path);
@@ -351,6 +353,7 @@ void check_materials(const std::string& path, std::string& text) {
                  std::to_string(found->second));
     }
   }
+  if (!any) refuse(path, 0, "no material in it; a library has lines like \"newmtl red\" and \"Kd 1 0 0\"");
 }
 
 using Materials = std::map<std::string, Material>;

@@ -76,14 +76,11 @@ Box bounds(const Scene& scene) {
 
 SceneFeatures features_of(const Scene& scene) {
   SceneFeatures features;
-  std::vector<bool> used(std::max<std::size_t>(scene.materials.size(), 1), false);
   for (const Mesh& mesh : scene.meshes) {
     features.normals |= !mesh.normals.empty();
     features.texture_coordinates |= !mesh.texture_coordinates.empty();
-    if (mesh.materials.empty() && !mesh.triangles.empty()) used[0] = true;
-    for (const std::uint32_t material : mesh.materials) used[material] = true;
+    for (const std::uint32_t material : mesh.materials) features.materials |= material != 0;
   }
-  features.materials = std::count(used.begin(), used.end(), true) > 1;
   return features;
 }
 

@@ -29,7 +29,7 @@ Camera framing(const Box& box, const vec3& up);
 struct SceneFeatures {
   bool normals = false;              ///< a mesh brings vertex normals
   bool texture_coordinates = false;  ///< a mesh brings texture coordinates
-  bool materials = false;            ///< more than one material is used
+  bool materials = false;            ///< a triangle has another material than the first
 
   /// The names of those that hold, for people and JSON.
   std::vector<std::string> names() const;

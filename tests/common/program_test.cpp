@@ -128,6 +128,7 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
       {"--scene good.obj --output image.bmp", 1, ".bmp"},
       {"--scene good.obj --output {}", 1, "trilha program"},
       {"--scene good.obj --output folder.obj", 1, "folder.obj"},
+      {"--scene good.obj --output $(printf %0300d 1)", 1, "cannot be written"},
       {"--scene good.obj --output /dev/full", 1, "No space left"},
       {"--scene good.obj --threads -1", 1, "--threads"},
       {"--scene good.obj --test no-such-test", 2, "watertight"},
@@ -153,7 +154,7 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
 
 // Catches: CUDA asked for and absent, but rendered on the CPU all the same.
 TEST_CASE("CUDA that is asked for and absent is exit code 3") {
-  if (trilha::why_unavailable(trilha::Backend::cuda).empty()) return;
+  if (trilha::why_unavailable(trilha::Backend::cuda).empty()) trilha::testing::skip("there is a CUDA device");
   Folder folder;
   const Result result = run(folder, "--scene teapot --backend cuda");
   CHECK(result.code == 3);
@@ -198,6 +199,14 @@ TEST_CASE("the JSON has the fixed names, and numbers that fit together") {
   REQUIRE(json["left_out"].size() >= 2);
   for (const Json& item : json["left_out"])
     for (const char* key : {"what", "why", "saved_bytes", "saved_ms"}) CHECK_FALSE(item[key].is_null());
+  const auto saved = [&](const std::string& what) -> Json {
+    for (const Json& item : json["left_out"])
+      if (item["what"] == what) return item["saved_bytes"];
+    return nullptr;
+  };
+  CHECK(saved("vertex normals") == 3 * 12);
+  CHECK(saved("a material a triangle") == 4);
+  CHECK(saved("the general shading kernel") == 0);
   CHECK(contents(folder / "a.png").substr(1, 3) == "PNG");
 }
 
@@ -218,6 +227,7 @@ TEST_CASE("the same picture from any folder, any number of threads, any loop") {
   CHECK(image("--samples 3 --no-specialise") == first);
   CHECK(image("--samples 3 --seed 1") != first);
   CHECK(image("--samples 4") != first);
+  CHECK(image("--samples 3 --specialise=false") == first);
   write(folder / "flags.ini", "samples = 3\nsize = \"100x80\"\ntest = \"watertight\"\n");
   CHECK(image("--config flags.ini") == first);
 }
@@ -254,6 +264,7 @@ TEST_CASE("a time limit adds samples until it has passed") {
   REQUIRE(result.code == 0);
   const Json json = Json::parse(result.out);
   CHECK(json["render_ms"] > 1400);
-  CHECK(json["render_ms"] < 4000);
+  CHECK(json["render_ms"] < 20000);  // on a machine as busy as it likes
+  CHECK(json["stopped"] == false);
   CHECK(json["samples"] > 1);
 }

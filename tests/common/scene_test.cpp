@@ -930,8 +930,9 @@ TEST_CASE("the facts of a scene count what its triangles use") {
   scene.meshes.resize(2);
   scene.meshes[0] = icosphere(0);
   CHECK_FALSE(features_of(scene).materials);
+  scene.meshes[0].materials.assign(20, 0);
+  CHECK_FALSE(features_of(scene).materials);  // the first is used, though three are there
   scene.meshes[0].materials.assign(20, 2);
-  CHECK_FALSE(features_of(scene).materials);  // one is used, though three are there
   scene.meshes[1] = icosphere(1, 1, dvec3(5, 0, 0));
   CHECK(features_of(scene).materials);
   CHECK(scene.triangle_count() == 100);

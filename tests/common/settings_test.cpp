@@ -55,6 +55,7 @@ TEST_CASE("colours are encoded as sRGB says") {
   CHECK(srgb_encoded(0.002f) == Approx(0.02584));
   CHECK(srgb_encoded(-1) == 0);
   CHECK(srgb_encoded(7) == Approx(1));
+  for (float x = 0; x <= 1; x += 1.0f / 64) CHECK(srgb_encoded(srgb_decoded(x)) == Approx(x).margin(1e-6));
   CHECK(srgb_encoded(std::nanf("")) == 0);
 }
 
