@@ -28,6 +28,8 @@ using vec4 = Vec4<float>;
 using dvec3 = Vec3<double>;
 using uvec3 = Vec3<std::uint32_t>;
 
+constexpr double pi = 3.14159265358979323846;
+
 /// a·b + c, rounded once, on every machine. Its value must not be negated: GCC makes −fma(a, b, c) one
 /// instruction, −(a·b) − c, whose zero has the other sign where the two cancel. Negate an argument of each
 /// product instead.

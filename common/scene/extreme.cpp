@@ -10,8 +10,6 @@
 namespace trilha {
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
-
 std::vector<vec3> placed(const std::vector<dvec3>& points, double scale, const dvec3& centre) {
   std::vector<vec3> result;
   result.reserve(points.size());

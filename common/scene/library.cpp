@@ -15,8 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double pi = 3.14159265358979323846;
-
 bool has_assets(const fs::path& folder) {
   std::error_code error;
   return fs::is_directory(folder / "assets" / "newell", error);

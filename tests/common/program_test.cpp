@@ -260,7 +260,8 @@ TEST_CASE("Ctrl-C ends the render soon and keeps the image so far") {
 // Catches: --time that is not kept.
 TEST_CASE("a time limit adds samples until it has passed") {
   Folder folder;
-  const Result result = run(folder, "--scene teapot --size 64x48 --time 1.5 --json --output t.png");
+  write(folder / "good.obj", triangle);
+  const Result result = run(folder, "--scene good.obj --size 64x48 --time 1.5 --json --output t.png");
   REQUIRE(result.code == 0);
   const Json json = Json::parse(result.out);
   CHECK(json["render_ms"] > 1400);
