@@ -68,9 +68,7 @@ std::size_t Scene::vertex_count() const {
 
 Box bounds(const Scene& scene) {
   Box box;
-  for (const Mesh& mesh : scene.meshes) {
-    box = united(box, bounds(mesh));
-  }
+  for (const Mesh& mesh : scene.meshes) box = united(box, bounds(mesh));
   return box;
 }
 

@@ -7,6 +7,7 @@
 #include "common/parallel/bands.h"
 #include "common/parallel/buffer.h"
 #include "common/parallel/for_each.h"
+#include "tests/random_values.h"
 #include "tests/testing.h"
 
 using namespace trilha;
@@ -20,14 +21,6 @@ std::vector<std::size_t> sizes() {
   Random random(1);
   for (int k = 0; k < 6; ++k) result.push_back(random.index(300000));
   return result;
-}
-
-template <class T>
-std::vector<T> random_values(std::size_t n, std::uint64_t seed, std::uint32_t below) {
-  std::vector<T> values(n);
-  Random random(seed);
-  for (T& value : values) value = static_cast<T>(random.index(below));
-  return values;
 }
 
 struct Fuse {

@@ -2,9 +2,9 @@
 #include <chrono>
 #include <functional>
 
-#include "common/math/random.h"
 #include "common/parallel/algorithms.h"
 #include "common/parallel/for_each.h"
+#include "tests/random_values.h"
 #include "tests/testing.h"
 
 using namespace trilha;
@@ -13,14 +13,6 @@ using namespace trilha::testing;
 namespace {
 
 constexpr std::size_t n = 1000000;
-
-template <class T>
-std::vector<T> random_values(std::uint64_t seed, std::uint32_t below) {
-  std::vector<T> values(n);
-  Random random(seed);
-  for (T& value : values) value = static_cast<T>(random.index(below));
-  return values;
-}
 
 struct Square {
   const std::uint32_t* in;
@@ -40,8 +32,8 @@ double milliseconds(const std::function<void()>& work) {
 // the best of many counts, and what is compared takes turns.
 TEST_CASE("on the CPU no primitive is slower than a serial loop at 10^6 elements") {
   require_meaningful_times();
-  const auto values = random_values<std::uint32_t>(1, 0xffffffffu);
-  const auto flags = random_values<std::uint8_t>(2, 2);
+  const auto values = random_values<std::uint32_t>(n, 1, 0xffffffffu);
+  const auto flags = random_values<std::uint8_t>(n, 2, 2);
   std::vector<std::uint32_t> out(n), keys(n), payload(n);
   struct Item {
     std::uint32_t key, value;
