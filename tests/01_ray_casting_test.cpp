@@ -3,8 +3,10 @@
 #include <random>
 
 #include "chapters/01_ray_casting/error_bounds.h"
+#include "chapters/01_ray_casting/pairs.h"
 #include "chapters/01_ray_casting/ray_casting.h"
 #include "chapters/01_ray_casting/triangle_blocks.h"
+#include "chapters/01_ray_casting/truth.h"
 #include "common/scene/extreme.h"
 #include "tests/stability/watertight.h"
 #include "tests/testing.h"
@@ -16,103 +18,20 @@ namespace {
 
 template <class Function>
 void with_every_test(const Function& function) {
-  for (const TriangleTest test : {TriangleTest::plane, TriangleTest::moller_trumbore,
-                                  TriangleTest::baldwin_weber, TriangleTest::watertight})
-    with_test(test, function);
+  for (const TriangleTest test : all_triangle_tests) with_test(test, function);
 }
 
 template <class Test>
 const char* name_of() {
-  if (std::is_same_v<Test, PlaneBarycentric>) return "plane";
-  if (std::is_same_v<Test, MollerTrumbore>) return "moller-trumbore";
-  if (std::is_same_v<Test, BaldwinWeber>) return "baldwin-weber";
-  return "watertight";
-}
-
-/// How many pairs or rays a check makes: what CI affords, times TRILHA_EFFORT where more is wanted.
-std::size_t effort(std::size_t n) {
-  const char* factor = std::getenv("TRILHA_EFFORT");
-  return factor ? n * std::strtoull(factor, nullptr, 10) : n;
+  for (const TriangleTest test : all_triangle_tests)
+    if (with_test(test, [](auto t) { return std::is_same_v<decltype(t), Test>; })) return name(test);
+  return "";
 }
 
 vec3 in_cube(Random& random) {
   const float x = random.uniform(-1, 1), y = random.uniform(-1, 1);
   return {x, y, random.uniform(-1, 1)};
 }
-
-/// A triangle and a ray that often meet; `kind` chooses how hard they make it. Only sums, products and square
-/// roots: the same bits on every machine, as long as no expression draws two random numbers, whose order
-/// would be the compiler's.
-struct Pair {
-  vec3 a, b, c;
-  Ray ray;
-};
-constexpr int pair_kinds = 12;
-TRILHA_HD Pair make_pair(Random& random, int kind) {
-  const auto cube = [&] {
-    const float x = random.uniform(-1, 1), y = random.uniform(-1, 1);
-    return vec3(x, y, random.uniform(-1, 1));
-  };
-  Pair p{cube(), cube(), cube(), {}};
-  float u = random.uniform(), v = random.uniform();
-  if (u + v > 1) u = 1 - u, v = 1 - v;
-  if (kind == 1) {  // a sliver, 1e7 times as long as wide
-    const vec3 on_edge = p.a + (p.b - p.a) * random.uniform();
-    p.c = on_edge + cube() * 1e-7f;
-  }
-  if (kind == 2) u = 0;      // at an edge
-  if (kind == 3) u = v = 0;  // at a vertex
-  vec3 aim = p.a * (1 - u - v) + p.b * u + p.c * v;
-  p.ray.origin = cube() * 3.0f;
-  if (kind == 4) p.ray.origin = aim;  // starts on the surface
-  p.ray.direction = aim - p.ray.origin;
-  if (kind == 4) p.ray.direction = cube();
-  if (kind == 5) p.ray.direction = p.b - p.a;  // parallel to an edge, grazing
-  if (kind == 6) {                             // along an axis
-    const auto axis = static_cast<int>(random.index(3));
-    p.ray.direction = vec3(0);
-    p.ray.direction[axis] = random.uniform() < 0.5f ? -1.0f : 1.0f;
-    p.ray.origin = aim - p.ray.direction * 2.0f;
-  }
-  if (kind == 7) p.b = p.a;  // no area
-  float scale = 1;
-  if (kind == 8) scale = 0x1p-60f;  // 1e-18
-  if (kind == 9) scale = 0x1p60f;   // 1e18
-  p.a *= scale, p.b *= scale, p.c *= scale, p.ray.origin *= scale;
-  if (kind == 10) {  // 1e5 sizes from the origin
-    const vec3 far = {66319.0f, 551.0f, -74843.0f};
-    p.a += far, p.b += far, p.c += far, p.ray.origin += far;
-  }
-  if (kind == 11) {  // components NaN, infinite, −0, subnormal
-    const float odd[5] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
-                          -0.0f, 1e-42f, 3e38f};
-    const float value = odd[random.index(5)];
-    vec3* vectors[5] = {&p.a, &p.b, &p.c, &p.ray.origin, &p.ray.direction};
-    vec3& victim = *vectors[random.index(5)];
-    victim[static_cast<int>(random.index(3))] = value;
-  }
-  return p;
-}
-
-struct PairResult {
-  std::uint32_t hit, front;
-  float t, u, v;
-  bool operator==(const PairResult& o) const { return std::memcmp(this, &o, sizeof o) == 0; }
-};
-
-template <class Test>
-struct TestPairs {
-  std::uint64_t seed, first;
-  PairResult* out;
-
-  TRILHA_HD void operator()(std::size_t i) const {
-    Random random(seed, first + i);
-    const Pair p = make_pair(random, static_cast<int>(i % pair_kinds));
-    Solution<float> s{};
-    const bool hit = intersect<Test>(p.a, p.b, p.c, p.ray, s);
-    out[i] = hit ? PairResult{1, s.front, s.t, s.u, s.v} : PairResult{};
-  }
-};
 
 /// A scene of one mesh.
 Scene scene_of(Mesh mesh) {
@@ -130,7 +49,8 @@ Mesh soup(std::uint32_t count, std::uint64_t seed, bool hostile) {
   Mesh mesh;
   for (std::uint32_t i = 0; i < count; ++i) {
     Random random(seed, i);
-    const Pair p = make_pair(random, hostile ? static_cast<int>(random.index(pair_kinds)) : 0);
+    const Pair p =
+        make_pair(random, hostile ? static_cast<PairKind>(random.index(pair_kinds)) : PairKind::random);
     for (const vec3& vertex : {p.a, p.b, p.c}) mesh.positions.push_back(vertex);
     mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
   }
@@ -210,66 +130,71 @@ TEST_CASE("each test finds the point it was aimed at, on the right side") {
 }
 
 // Catches: an error bound that does not hold, a test that loses digits, hits and misses that no rounding
-// explains.
-TEST_CASE("t stays within the derived bound of the same test in 80-bit arithmetic") {
-  with_every_test([](auto test) {
-    using Test = decltype(test);
-    using Wide = long double;
-    std::size_t compared = 0, unbounded = 0, far = 0, disagreements = 0;
-    double tightest = 0;
-    const std::size_t n = effort(280000);
-    for (std::size_t i = 0; i < n; ++i) {
-      Random random(2, i);
-      const int kind = static_cast<int>(i % (pair_kinds - 1));  // all but NaN and infinity
-      const Pair p = make_pair(random, kind);
-      Solution<float> s{};
-      Solution<Wide> exact{};
-      RayOf<Wide> wide;
-      wide.origin = Vec3<Wide>(p.ray.origin);
-      wide.direction = Vec3<Wide>(p.ray.direction);
-      const bool hit = intersect<Test>(p.a, p.b, p.c, p.ray, s);
-      const bool truly = intersect<Test>(Vec3<Wide>(p.a), Vec3<Wide>(p.b), Vec3<Wide>(p.c), wide, exact);
-      if (hit != truly) {
-        ++disagreements;
-        const Wide edge = std::min({exact.u, exact.v, 1 - exact.u - exact.v});
-        const double other = std::min({double(s.u), double(s.v), 1.0 - s.u - s.v});
-        far += kind == 0 && (truly ? edge > 1e-3L : other > 1e-3);
-      }
-      if (!hit || !truly) continue;
-      const double bound = t_error_bound<Test>(p.a, p.b, p.c, p.ray, s.t);
-      if (!(bound < error_bounds::infinity)) {
-        ++unbounded;
-        continue;
-      }
-      ++compared;
-      const double error = static_cast<double>(std::fabs(s.t - exact.t));
-      if (bound > 0) tightest = std::max(tightest, error / bound);
-      if (!(error <= bound))
-        FAIL_CHECK(name_of<Test>() << " pair " << i << " kind " << kind << ": t " << s.t << " error " << error
-                                   << " bound " << bound);
+// explains; in float and in double.
+template <class Test, class T>
+void check_bound() {
+  std::size_t compared = 0, unbounded = 0, far = 0, disagreements = 0;
+  double tightest = 0;
+  const std::size_t n = effort(110000);
+  for (std::size_t i = 0; i < n; ++i) {
+    Random random(2, i);
+    const auto kind = static_cast<PairKind>(i % (pair_kinds - 1));  // all but NaN and infinity
+    const Pair p = make_pair(random, kind);
+    const RayOf<T> ray = p.ray.as<T>();
+    Solution<T> s{};
+    const bool hit = intersect<Test>(Vec3<T>(p.a), Vec3<T>(p.b), Vec3<T>(p.c), ray, s);
+    const Truth truth = true_intersection(p.a, p.b, p.c, p.ray);
+    if (hit != truth.hit && truth.sure) {
+      ++disagreements;
+      const long double edge = std::min({truth.u, truth.v, 1 - truth.u - truth.v});
+      const double other = std::min({double(s.u), double(s.v), 1.0 - s.u - s.v});
+      far += kind == PairKind::random && (truth.hit ? edge > 1e-3L : other > 1e-3);
     }
-    std::printf("  %-16s %zu compared, largest error / bound %.3f, unbounded %zu, hit or miss differs %zu\n",
-                name_of<Test>(), compared, tightest, unbounded, disagreements);
-    CHECK(compared > n / 5);
-    CHECK(tightest > 0.02);  // a bound a hundred times too wide would say nothing
-    CHECK(far <= n / 100000);
+    if (!hit || !truth.hit) continue;
+    const double bound = t_error_bound<Test>(p.a, p.b, p.c, ray, s.t);
+    if (!(bound < error_bounds::infinity)) {
+      ++unbounded;
+      continue;
+    }
+    ++compared;
+    // the truth has a bound, too, which counts beside double's
+    const double own = t_error_bound<Watertight>(p.a, p.b, p.c, p.ray.as<long double>(), truth.t);
+    const double error = static_cast<double>(std::fabs(s.t - truth.t));
+    if (bound > 0) tightest = std::max(tightest, error / bound);
+    if (!(error <= bound + own))
+      FAIL_CHECK(name_of<Test>() << " pair " << i << " kind " << int(kind) << ": t " << s.t << " error "
+                                 << error << " bound " << bound);
+  }
+  std::printf(
+      "  %-16s %s: %zu compared, largest error / bound %.3f, unbounded %zu, hit or miss differs %zu\n",
+      name_of<Test>(), sizeof(T) == 4 ? "float " : "double", compared, tightest, unbounded, disagreements);
+  CHECK(compared > n / 5);
+  CHECK(tightest > 0.02);  // a bound a hundred times too wide would say nothing
+  CHECK(far <= n / 100000);
+}
+TEST_CASE("t stays within the derived bound of the ground truth") {
+  with_every_test([](auto test) {
+    check_bound<decltype(test), float>();
+    check_bound<decltype(test), double>();
   });
 }
 
-// Catches: NaN or t outside the interval let through, in particular by comparisons written the wrong way
-// round.
+// Catches: hits on or by what is no number, t outside the interval let through, in particular by comparisons
+// written the wrong way round.
 TEST_CASE("no input, however hostile, makes a hit outside the interval") {
   with_every_test([](auto test) {
     using Test = decltype(test);
     for (std::size_t i = 0; i < effort(400000); ++i) {
       Random random(3, i);
-      Pair p = make_pair(random, static_cast<int>(i % pair_kinds));
+      Pair p = make_pair(random, static_cast<PairKind>(i % pair_kinds));
       p.ray.t_min = random.uniform(-1, 1);
       p.ray.t_max = p.ray.t_min + random.uniform(-0.5f, 2);
       Solution<float> s{};
       if (!intersect<Test>(p.a, p.b, p.c, p.ray, s)) continue;
+      const bool numbers = std::isfinite(glm::dot(dvec3(p.a) + dvec3(p.b) + dvec3(p.c), dvec3(1))) &&
+                           std::isfinite(glm::dot(dvec3(p.ray.origin) + dvec3(p.ray.direction), dvec3(1)));
       const bool good =
-          s.t >= p.ray.t_min && s.t < p.ray.t_max && s.u >= 0 && s.v >= 0 && s.u <= 1 && s.v <= 1;
+          numbers && s.t >= p.ray.t_min && s.t < p.ray.t_max && s.u >= 0 && s.v >= 0 && s.u <= 1 && s.v <= 1;
       if (!good)
         FAIL_CHECK(name_of<Test>() << " pair " << i << ": t " << s.t << " u " << s.u << " v " << s.v);
     }
@@ -312,8 +237,7 @@ TEST_CASE("plain loop, blocks and tiles give the same hits, bit for bit") {
   for (const std::uint32_t count : {0u, 1u, 15u, 16u, 17u, 127u, 128u, 129u, 1000u})
     for (const bool hostile : {false, true}) {
       const Scene scene = scene_of(soup(count, 6, hostile));
-      for (const TriangleTest test : {TriangleTest::plane, TriangleTest::moller_trumbore,
-                                      TriangleTest::baldwin_weber, TriangleTest::watertight})
+      for (const TriangleTest test : all_triangle_tests)
         for (const bool one_sided : {false, true}) {
           RayCastingSettings settings;
           settings.test = test;
@@ -461,26 +385,29 @@ TEST_CASE("the watertight test misses nothing from inside closed meshes, and kee
 }
 
 // Catches: any operation that rounds differently on the two machines.
-TEST_CASE("random and extreme pairs give the same bits on CPU and CUDA") {
-  require_cuda();
-  const std::size_t chunk = std::size_t{pair_kinds} << 18, chunks = std::max<std::size_t>(1, effort(1));
-  with_every_test([&](auto test) {
-    using Test = decltype(test);
-    std::size_t different = 0, hits = 0;
-    Buffer<PairResult> host(Backend::cpu, chunk), device(Backend::cuda, chunk);
-    for (std::size_t k = 0; k < chunks; ++k) {
-      for_each(Backend::cpu, chunk, TestPairs<Test>{12, k * chunk, host.data()});
-      for_each(Backend::cuda, chunk, TestPairs<Test>{12, k * chunk, device.data()});
-      const std::vector<PairResult> there = device.to_vector(Backend::cuda);
+template <class Test, class T>
+void check_same_bits() {
+  const std::size_t chunk = std::size_t{1} << 18, chunks = std::max<std::size_t>(1, effort(1));
+  std::size_t different = 0, hits = 0;
+  for (std::size_t k = 0; k < chunks; ++k)
+    for (int kind = 0; kind < pair_kinds; ++kind) {
+      const std::vector<Pair> pairs = make_pairs(static_cast<PairKind>(kind), chunk, 12 + 100 * k);
+      const auto here = answers<Test, T>(Backend::cpu, pairs), there = answers<Test, T>(Backend::cuda, pairs);
       for (std::size_t i = 0; i < chunk; ++i) {
-        different += !(there[i] == host.data()[i]);
-        hits += there[i].hit;
+        different += std::memcmp(&here[i], &there[i], sizeof here[i]) != 0;
+        hits += here[i].hit;
       }
     }
-    std::printf("  %-16s %zu pairs, %zu hits, %zu different\n", name_of<Test>(), chunk * chunks, hits,
-                different);
-    CHECK(different == 0);
-    CHECK(hits > chunk * chunks / 5);
+  std::printf("  %-16s %s: %zu pairs, %zu hits, %zu different\n", name_of<Test>(),
+              sizeof(T) == 4 ? "float " : "double", chunk * chunks * pair_kinds, hits, different);
+  CHECK(different == 0);
+  CHECK(hits > chunk * chunks * pair_kinds / 5);
+}
+TEST_CASE("random and extreme pairs give the same bits on CPU and CUDA") {
+  require_cuda();
+  with_every_test([](auto test) {
+    check_same_bits<decltype(test), float>();
+    check_same_bits<decltype(test), double>();
   });
 }
 
@@ -492,8 +419,7 @@ TEST_CASE("every pixel's hit is the same on CPU and CUDA") {
   std::vector<Ray> rays(tiling.size());
   for_each(Backend::cpu, tiling.size(),
            PrimaryRays{PinholeCamera::make(scene.camera, 640, 480), tiling, 0, 0, 0, false, rays.data()});
-  for (const TriangleTest test : {TriangleTest::plane, TriangleTest::moller_trumbore,
-                                  TriangleTest::baldwin_weber, TriangleTest::watertight}) {
+  for (const TriangleTest test : all_triangle_tests) {
     RayCastingSettings settings;
     settings.test = test;
     const std::vector<Hit> cpu = traced(scene, settings, rays, Backend::cpu);
@@ -625,11 +551,11 @@ TEST_CASE("what is left out changes no pixel and saves memory") {
 
 // Catches: a stop that loses what was rendered, or that is not heeded.
 TEST_CASE("a render that is stopped keeps the pixels done so far") {
-  const Scene scene = scene_of(icosphere(2));
+  const Scene scene = scene_of(icosphere(4));  // work for seconds, in bands of a millisecond
   RayCaster caster(scene, {}, Backend::cpu);
   Film film(Backend::cpu, 2048, 1024);
   int bands = 0;
-  CHECK_FALSE(caster.add_sample(film, scene.camera, 0, false, 0, 100, [&](double) { return ++bands < 2; }));
+  CHECK_FALSE(caster.add_sample(film, scene.camera, 0, false, 0, 1, [&](double) { return ++bands < 2; }));
   CHECK(bands == 2);
   std::size_t done = 0;
   for (std::size_t i = 0; i < 2048 * 1024; ++i) done += film.pixels()[i].w == 1;

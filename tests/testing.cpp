@@ -29,6 +29,11 @@ std::vector<Backend> backends() {
   return result;
 }
 
+std::size_t effort(std::size_t n) {
+  const char* factor = std::getenv("TRILHA_EFFORT");
+  return factor ? n * std::strtoull(factor, nullptr, 10) : n;
+}
+
 }  // namespace trilha::testing
 
 int main(int argc, char** argv) { return Catch::Session().run(argc, argv); }

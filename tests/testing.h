@@ -27,4 +27,7 @@ void require_meaningful_times();
 /// calls require_cuda.
 std::vector<Backend> backends();
 
+/// How many pairs or rays a check makes: what CI affords, times TRILHA_EFFORT where more is wanted.
+std::size_t effort(std::size_t n);
+
 }  // namespace trilha::testing

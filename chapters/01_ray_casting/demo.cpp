@@ -2,7 +2,8 @@
 
 #include <optional>
 
-#include "chapters/01_ray_casting/ray_casting.h"
+#include "chapters/01_ray_casting/experiments.h"
+#include "chapters/01_ray_casting/stability.h"
 #include "common/image/colour_map.h"
 
 namespace trilha {
@@ -106,6 +107,9 @@ class RayCastingDemo final : public Demo {
          "one compiled for what " + shading + " reads runs instead");
     return list;
   }
+
+  std::vector<Experiment> experiments() const override { return ray_casting_experiments(); }
+  std::vector<StabilityCase> extreme_cases() const override { return ray_casting_stability_cases(); }
 
  private:
   RayCastingSettings settings_;

@@ -4,14 +4,9 @@
 #include <cmath>
 #include <type_traits>
 
-#include "chapters/01_ray_casting/triangle_blocks.h"
 #include "common/error.h"
 #include "common/parallel/bands.h"
 #include "common/parallel/for_each.h"
-
-#if defined(__CUDACC__)
-#include "chapters/01_ray_casting/triangle_tiles.h"
-#endif
 
 namespace trilha {
 
@@ -175,37 +170,20 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
     for (const Material& material : scene.materials) diffuse.push_back(material.diffuse);
     diffuse_ = Buffer(stream_, diffuse);
   }
-  with_test(settings_.test, [&](auto test) { prepare<decltype(test)>(); });
+  with_test(settings_.test, [&](auto test) {
+    numbers_ = prepare_triangles<decltype(test), float>(stream_, settings_.loop, positions_.data(),
+                                                        triangles_.data(), count_);
+  });
   stream_.synchronize();
   if (!reads_surface(settings_) && !keep.surface) positions_ = {}, triangles_ = {};
-}
-
-template <class Test>
-void RayCaster::prepare() {
-  if (count_ == 0) return;
-  const bool blocks = stream_.backend() == Backend::cpu && settings_.loop == Loop::blocked;
-  const std::uint32_t lanes = blocks ? block_lanes : 1;
-  const std::size_t padded = (static_cast<std::size_t>(count_) + lanes - 1) / lanes * lanes;
-  numbers_ = Buffer<float>(stream_.backend(), padded * Test::numbers);
-  for_each(stream_, padded,
-           PrepareTriangles<Test>{positions_.data(), triangles_.data(), count_, lanes, numbers_.data()});
 }
 
 // ---- rendering ---------------------------------------------------------------
 
 void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
   with_test(settings_.test, [&](auto test) {
-    using Primitives = Triangles<decltype(test)>;
-    const Primitives triangles{numbers_.data(), count_, settings_.one_sided};
-    if (settings_.loop == Loop::plain) {
-      for_each(stream_, n, Trace<BruteForce<Primitives>>{{triangles}, 0, rays, hits}, 64);
-    } else if (stream_.backend() == Backend::cpu) {
-      trace_blocks(triangles, rays, hits, n);
-    } else {
-#if defined(__CUDACC__)
-      trace_tiles(stream_, triangles, rays, hits, n);
-#endif
-    }
+    const Triangles<decltype(test)> triangles{numbers_.data(), count_, settings_.one_sided};
+    trace_triangles(stream_, settings_.loop, triangles, rays, hits, n);
   });
 }
 

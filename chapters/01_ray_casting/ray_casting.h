@@ -1,8 +1,8 @@
 #pragma once
 // Ray casting (Appel 1968): for every pixel one ray from the eye, the nearest surface along it by asking
 // every triangle, and a colour from what was hit. Read from top to bottom: camera, structure, passes, and the
-// caster that runs them. ray_casting.cpp builds and renders; triangle_blocks and triangle_tiles are the same
-// loop in the order that a CPU's vectors and a GPU's shared memory want.
+// caster that runs them. ray_casting.cpp builds and renders, brute_force.cpp runs the loop; triangle_blocks
+// and triangle_tiles are the same loop in the order that a CPU's vectors and a GPU's shared memory want.
 
 #include <functional>
 
@@ -41,29 +41,32 @@ struct PinholeCamera {
 // ---- the structure: no structure at all --------------------------------------
 
 /// Triangles as primitives: `count` of them, with Test::numbers numbers each, one triangle after the other.
-template <class Test_>
+/// The scalar is float in the product, wider in references.
+template <class Test_, class T = float>
 struct Triangles {
   using Test = Test_;
-  const float* numbers;
+  using Scalar = T;
+  const T* numbers;
   std::uint32_t count;
   bool one_sided;  ///< only front faces can be hit
 
   /// What the test wants to know of a ray, worked out once for all triangles.
-  TRILHA_HD auto constants(const Ray& ray) const { return Test::constants(ray); }
+  TRILHA_HD auto constants(const RayOf<T>& ray) const { return Test::constants(ray); }
 
   /// Makes triangle i the hit if it is nearer than the hit so far. Of equals, the first stays.
   template <class Constants>
-  TRILHA_HD void intersect(std::uint32_t i, const Ray& ray, const Constants& constants, Hit& hit) const {
-    const Numbers<float> triangle{numbers + static_cast<std::size_t>(i) * Test::numbers};
+  TRILHA_HD void intersect(std::uint32_t i, const RayOf<T>& ray, const Constants& constants,
+                           HitOf<T>& hit) const {
+    const Numbers<T> triangle{numbers + static_cast<std::size_t>(i) * Test::numbers};
     const auto measure = Test::measure(triangle, ray, constants);
     if (Test::may_hit(measure)) settle(measure, i, ray, constants, hit);
   }
 
   /// The rare second half: the decision on a triangle that may_hit let pass.
   template <class Measure, class Constants>
-  TRILHA_HD void settle(const Measure& measure, std::uint32_t i, const Ray& ray, const Constants& constants,
-                        Hit& hit) const {
-    Solution<float> s;
+  TRILHA_HD void settle(const Measure& measure, std::uint32_t i, const RayOf<T>& ray,
+                        const Constants& constants, HitOf<T>& hit) const {
+    Solution<T> s;
     if (Test::solve(measure, ray, constants, s) && s.t >= ray.t_min && s.t < hit.t && (s.front || !one_sided))
       hit = {s.t, i, 0, s.u, s.v};
   }
@@ -72,12 +75,13 @@ struct Triangles {
 /// Asks every primitive. All later structures answer the same two questions with the same hits, only sooner.
 template <class Primitives>
 struct BruteForce {
+  using Scalar = typename Primitives::Scalar;
   Primitives primitives;
 
   /// The nearest hit with t in [ray.t_min, ray.t_max); of equal t the lowest primitive number.
   template <class ProbeType>
-  TRILHA_HD Hit closest(const Ray& ray, ProbeType& probe) const {
-    Hit hit;
+  TRILHA_HD HitOf<Scalar> closest(const RayOf<Scalar>& ray, ProbeType& probe) const {
+    HitOf<Scalar> hit;
     hit.t = ray.t_max;
     const auto constants = primitives.constants(ray);
     for (std::uint32_t i = 0; i < primitives.count; ++i) primitives.intersect(i, ray, constants, hit);
@@ -87,8 +91,8 @@ struct BruteForce {
 
   /// Is there any hit with t in [ray.t_min, ray.t_max)? Stops at the first.
   template <class ProbeType>
-  TRILHA_HD bool occluded(const Ray& ray, ProbeType& probe) const {
-    Hit hit;
+  TRILHA_HD bool occluded(const RayOf<Scalar>& ray, ProbeType& probe) const {
+    HitOf<Scalar> hit;
     hit.t = ray.t_max;
     const auto constants = primitives.constants(ray);
     for (std::uint32_t i = 0; i < primitives.count; ++i) {
@@ -103,6 +107,13 @@ struct BruteForce {
 // ---- settings ----------------------------------------------------------------
 
 enum class TriangleTest { plane, moller_trumbore, baldwin_weber, watertight };
+constexpr TriangleTest all_triangle_tests[] = {TriangleTest::plane, TriangleTest::moller_trumbore,
+                                               TriangleTest::baldwin_weber, TriangleTest::watertight};
+/// Its name as the settings have it.
+inline const char* name(TriangleTest test) {
+  constexpr const char* names[] = {"plane", "moller-trumbore", "baldwin-weber", "watertight"};
+  return names[static_cast<int>(test)];
+}
 enum class Loop { plain, blocked };
 enum class Shading { lambert, normals, depth, primitive, barycentrics, facing, tests };
 
@@ -155,18 +166,18 @@ decltype(auto) with_test(TriangleTest test, const Function& function) {
 /// Triangle i → the numbers that the test keeps of it, in groups of `lanes` triangles: number k of a group's
 /// triangles lies together. One lane is one triangle after the other. The last group is filled up with the
 /// last triangle.
-template <class Test>
+template <class Test, class T = float>
 struct PrepareTriangles {
   const vec3* positions;
   const uvec3* triangles;
   std::uint32_t count, lanes;
-  float* out;
+  T* out;
 
   TRILHA_HD void operator()(std::size_t i) const {
     const uvec3 t = triangles[i < count ? i : count - 1];
-    float numbers[Test::numbers];
-    Test::prepare(positions[t.x], positions[t.y], positions[t.z], numbers);
-    float* group = out + i / lanes * lanes * Test::numbers + i % lanes;
+    T numbers[Test::numbers];
+    Test::prepare(Vec3<T>(positions[t.x]), Vec3<T>(positions[t.y]), Vec3<T>(positions[t.z]), numbers);
+    T* group = out + i / lanes * lanes * Test::numbers + i % lanes;
     for (int k = 0; k < Test::numbers; ++k) group[static_cast<std::size_t>(k) * lanes] = numbers[k];
   }
 };
@@ -200,16 +211,28 @@ struct PrimaryRays {
 /// Ray → hit, by any structure.
 template <class Structure>
 struct Trace {
+  using T = typename Structure::Scalar;
   Structure structure;
   std::size_t first;
-  const Ray* rays;
-  Hit* hits;
+  const RayOf<T>* rays;
+  HitOf<T>* hits;
 
   TRILHA_HD void operator()(std::size_t i) const {
     NoProbe probe;
     hits[i - first] = structure.closest(rays[i - first], probe);
   }
 };
+
+/// What the test keeps of `count` triangles, in the order that the loop wants on the stream's backend, where
+/// all arrays lie.
+template <class Test, class T>
+Buffer<T> prepare_triangles(const Stream& stream, Loop loop, const vec3* positions, const uvec3* triangles,
+                            std::uint32_t count);
+
+/// The nearest hit of each of n rays among triangles prepared for that loop. All loops give the same hits.
+template <class Test, class T>
+void trace_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles,
+                     const RayOf<T>* rays, HitOf<T>* hits, std::size_t n);
 
 /// What shading reads of the surface. Null is what the chosen mode does not need.
 struct SurfaceView {
@@ -276,8 +299,6 @@ class RayCaster {
   std::uint32_t triangle_count() const { return count_; }
 
  private:
-  template <class Test>
-  void prepare();
   template <Reads reads>
   void shade(std::size_t begin, std::size_t end, Film& film, const Camera& camera);
 

@@ -227,7 +227,13 @@ struct Watertight : KeepsVertices {
     const Vec3<T> size = {std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)};
     const int kz = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
     const int kx = kz == 2 ? 0 : kz + 1, ky = kx == 2 ? 0 : kx + 1;
-    return {kx, ky, kz, d[kx] / d[kz], d[ky] / d[kz], {ray.origin[kx], ray.origin[ky], ray.origin[kz]}};
+    const T nothing = d[kz] - d[kz];  // 0, or NaN where the direction is infinite and could not be told apart
+    return {kx,
+            ky,
+            kz,
+            d[kx] / d[kz] + nothing,
+            d[ky] / d[kz] + nothing,
+            {ray.origin[kx], ray.origin[ky], ray.origin[kz]}};
   }
 
   template <class T>

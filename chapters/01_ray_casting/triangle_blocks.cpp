@@ -13,15 +13,14 @@ constexpr std::size_t chunk_bytes = 16 << 10;  // half of a first-level cache
 
 /// Tests one ray against one block. Measuring is a loop without a branch, which the compiler turns into
 /// vectors; the few lanes that pass are settled one by one, by the code of the plain loop.
-template <class Test, class Constants>
-inline void test_block(const Triangles<Test>& triangles, std::uint32_t block, const Ray& ray,
-                       const Constants& constants, Hit& hit) {
-  const float* numbers = triangles.numbers + static_cast<std::size_t>(block) * block_lanes * Test::numbers;
+template <class Test, class T, class Constants>
+inline void test_block(const Triangles<Test, T>& triangles, std::uint32_t block, const RayOf<T>& ray,
+                       const Constants& constants, HitOf<T>& hit) {
+  const T* numbers = triangles.numbers + static_cast<std::size_t>(block) * block_lanes * Test::numbers;
   alignas(64) std::uint32_t passed[block_lanes];
   std::uint32_t any = 0;
   for (std::uint32_t lane = 0; lane < block_lanes; ++lane) {
-    const bool pass =
-        Test::may_hit(Test::measure(Numbers<float>{numbers + lane, block_lanes}, ray, constants));
+    const bool pass = Test::may_hit(Test::measure(Numbers<T>{numbers + lane, block_lanes}, ray, constants));
     passed[lane] = pass ? 1 : 0;
     any |= passed[lane];
   }
@@ -29,34 +28,34 @@ inline void test_block(const Triangles<Test>& triangles, std::uint32_t block, co
   for (std::uint32_t lane = 0; lane < block_lanes; ++lane) {
     const std::uint32_t i = block * block_lanes + lane;
     if (passed[lane] == 0 || i >= triangles.count) continue;
-    triangles.settle(Test::measure(Numbers<float>{numbers + lane, block_lanes}, ray, constants), i, ray,
+    triangles.settle(Test::measure(Numbers<T>{numbers + lane, block_lanes}, ray, constants), i, ray,
                      constants, hit);
   }
 }
 
 }  // namespace
 
-template <class Test>
-void trace_blocks(const Triangles<Test>& triangles, const Ray* rays, Hit* hits, std::size_t n) {
-  using Constants = decltype(Test::constants(Ray{}));
+template <class Test, class T>
+void trace_blocks(const Triangles<Test, T>& triangles, const RayOf<T>* rays, HitOf<T>* hits, std::size_t n) {
+  using Constants = decltype(Test::constants(RayOf<T>{}));
   const auto blocks =
       static_cast<std::uint32_t>((std::size_t{triangles.count} + block_lanes - 1) / block_lanes);
-  constexpr std::uint32_t chunk = chunk_bytes / (block_lanes * Test::numbers * sizeof(float));
+  constexpr std::uint32_t chunk = chunk_bytes / (block_lanes * Test::numbers * sizeof(T));
   const std::size_t batches = (n + batch - 1) / batch;
   tbb::parallel_for(std::size_t{0}, batches, [&](std::size_t b) {
     const std::size_t first = b * batch, last = std::min(n, first + batch);
     Constants constants[batch];
     for (std::size_t r = first; r < last; ++r) {
       constants[r - first] = Test::constants(rays[r]);
-      hits[r] = Hit{};
+      hits[r] = {};
       hits[r].t = rays[r].t_max;
     }
     for (std::uint32_t begin = 0; begin < blocks; begin += chunk) {
       const std::uint32_t end = std::min(blocks, begin + chunk);
       for (std::size_t r = first; r < last; ++r) {
-        const Ray ray = rays[r];
+        const RayOf<T> ray = rays[r];
         const Constants own = constants[r - first];
-        Hit hit = hits[r];
+        HitOf<T> hit = hits[r];
         for (std::uint32_t block = begin; block < end; ++block) test_block(triangles, block, ray, own, hit);
         hits[r] = hit;
       }
@@ -64,9 +63,16 @@ void trace_blocks(const Triangles<Test>& triangles, const Ray* rays, Hit* hits, 
   });
 }
 
-template void trace_blocks(const Triangles<PlaneBarycentric>&, const Ray*, Hit*, std::size_t);
-template void trace_blocks(const Triangles<MollerTrumbore>&, const Ray*, Hit*, std::size_t);
-template void trace_blocks(const Triangles<BaldwinWeber>&, const Ray*, Hit*, std::size_t);
-template void trace_blocks(const Triangles<Watertight>&, const Ray*, Hit*, std::size_t);
+#define INSTANTIATE(Test, T) \
+  template void trace_blocks(const Triangles<Test, T>&, const RayOf<T>*, HitOf<T>*, std::size_t);
+INSTANTIATE(PlaneBarycentric, float)
+INSTANTIATE(MollerTrumbore, float)
+INSTANTIATE(BaldwinWeber, float)
+INSTANTIATE(Watertight, float)
+INSTANTIATE(PlaneBarycentric, double)
+INSTANTIATE(MollerTrumbore, double)
+INSTANTIATE(BaldwinWeber, double)
+INSTANTIATE(Watertight, double)
+#undef INSTANTIATE
 
 }  // namespace trilha

@@ -11,7 +11,7 @@ namespace trilha {
 constexpr std::uint32_t block_lanes = 16;
 
 /// The nearest hit of each of n rays among the triangles, whose numbers lie in blocks of `block_lanes`.
-template <class Test>
-void trace_blocks(const Triangles<Test>& triangles, const Ray* rays, Hit* hits, std::size_t n);
+template <class Test, class T>
+void trace_blocks(const Triangles<Test, T>& triangles, const RayOf<T>* rays, HitOf<T>* hits, std::size_t n);
 
 }  // namespace trilha

@@ -13,59 +13,66 @@ namespace trilha {
 
 constexpr int tile_threads = 128;
 constexpr int tile_triangles = 128;
-constexpr int rays_a_thread = 4;  // they share what is read of a triangle, and hide each other's latency
+/// They share what is read of a triangle, and hide each other's latency; doubles fill the registers sooner.
+template <class T>
+constexpr int rays_a_thread = sizeof(T) == 4 ? 4 : 2;
 
-/// One triangle in shared memory: three 16-byte reads, whatever the test keeps.
+/// One triangle in shared memory, read 16 bytes at a time, whatever the test keeps.
+template <class T>
 struct alignas(16) TileSlot {
-  float numbers[12];
+  T numbers[12];
 };
 
 /// Measures the triangle in a slot. In a turned tile coordinates lie in the order that all the rays want.
-template <bool turned, class Test, class Constants>
-__device__ inline auto measure_slot(const float* s, const Ray& ray, const Constants& constants) {
+template <bool turned, class Test, class T, class Constants>
+__device__ inline auto measure_slot(const T* s, const RayOf<T>& ray, const Constants& constants) {
   if constexpr (turned) {
     return Test::measure_turned(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], constants);
   } else {
-    return Test::measure(Numbers<float>{s}, ray, constants);
+    return Test::measure(Numbers<T>{s}, ray, constants);
   }
 }
 
 /// The rare second half. It is a call, so that its many registers do not weigh on the loop.
-template <bool turned, class Test, class Constants>
-__device__ __noinline__ Hit settle_slot(const Triangles<Test> triangles, const float* slot, std::uint32_t i,
-                                        const Ray ray, const Constants constants, Hit hit) {
+template <bool turned, class Test, class T, class Constants>
+__device__ __noinline__ HitOf<T> settle_slot(const Triangles<Test, T> triangles, const T* slot,
+                                             std::uint32_t i, const RayOf<T> ray, const Constants constants,
+                                             HitOf<T> hit) {
   const auto measure = measure_slot<turned, Test>(slot, ray, constants);
   if (Test::may_hit(measure)) triangles.settle(measure, i, ray, constants, hit);
   return hit;
 }
 
 /// Tests a thread's rays against the tile: measured without a branch, one branch for all of them.
-template <bool turned, class Test, class Constants>
-__device__ inline void test_tile(const Triangles<Test>& triangles, const TileSlot* tile, std::uint32_t begin,
-                                 std::uint32_t count, const Ray* ray, const Constants* constants, Hit* hit) {
+template <bool turned, class Test, class T, class Constants>
+__device__ inline void test_tile(const Triangles<Test, T>& triangles, const TileSlot<T>* tile,
+                                 std::uint32_t begin, std::uint32_t count, const RayOf<T>* ray,
+                                 const Constants* constants, HitOf<T>* hit) {
 #pragma unroll 2
   for (std::uint32_t j = 0; j < count; ++j) {
-    const float* slot = tile[j].numbers;
+    const T* slot = tile[j].numbers;
     bool any = false;
-    for (int r = 0; r < rays_a_thread; ++r)
+    for (int r = 0; r < rays_a_thread<T>; ++r)
       any |= Test::may_hit(measure_slot<turned, Test>(slot, ray[r], constants[r]));
     if (!any) continue;
-    for (int r = 0; r < rays_a_thread; ++r)
+    for (int r = 0; r < rays_a_thread<T>; ++r)
       hit[r] = settle_slot<turned>(triangles, slot, begin + j, ray[r], constants[r], hit[r]);
   }
 }
 
-template <class Test>
+template <class Test, class T>
 __global__ void __launch_bounds__(tile_threads)
-    trace_tiles_kernel(const Triangles<Test> triangles, const Ray* rays, Hit* hits, std::size_t n) {
+    trace_tiles_kernel(const Triangles<Test, T> triangles, const RayOf<T>* rays, HitOf<T>* hits,
+                       std::size_t n) {
   constexpr bool watertight = std::is_same_v<Test, Watertight>;
-  __shared__ TileSlot tile[tile_triangles];
+  constexpr int own = rays_a_thread<T>;
+  __shared__ TileSlot<T> tile[tile_triangles];
 
-  Ray ray[rays_a_thread];
-  decltype(Test::constants(Ray{})) constants[rays_a_thread];
-  Hit hit[rays_a_thread];
-  const std::size_t first = static_cast<std::size_t>(blockIdx.x) * tile_threads * rays_a_thread + threadIdx.x;
-  for (int r = 0; r < rays_a_thread; ++r) {
+  RayOf<T> ray[own];
+  decltype(Test::constants(RayOf<T>{})) constants[own];
+  HitOf<T> hit[own];
+  const std::size_t first = static_cast<std::size_t>(blockIdx.x) * tile_threads * own + threadIdx.x;
+  for (int r = 0; r < own; ++r) {
     const std::size_t i = first + r * tile_threads;
     ray[r] = rays[i < n ? i : n - 1];
     constants[r] = Test::constants(ray[r]);
@@ -81,7 +88,7 @@ __global__ void __launch_bounds__(tile_threads)
     if (threadIdx.x == 0) wanted = constants[0].kz;
     __syncthreads();
     bool agreed = true;
-    for (int r = 0; r < rays_a_thread; ++r) agreed = agreed && constants[r].kz == wanted;
+    for (int r = 0; r < own; ++r) agreed = agreed && constants[r].kz == wanted;
     if (__syncthreads_and(agreed)) turn = wanted;
   }
 
@@ -102,16 +109,16 @@ __global__ void __launch_bounds__(tile_threads)
       test_tile<false>(triangles, tile, begin, count, ray, constants, hit);
     }
   }
-  for (int r = 0; r < rays_a_thread; ++r)
+  for (int r = 0; r < own; ++r)
     if (const std::size_t i = first + r * tile_threads; i < n) hits[i] = hit[r];
 }
 
 /// The nearest hit of each of n rays; all arrays lie on the device.
-template <class Test>
-void trace_tiles(const Stream& stream, const Triangles<Test>& triangles, const Ray* rays, Hit* hits,
-                 std::size_t n) {
+template <class Test, class T>
+void trace_tiles(const Stream& stream, const Triangles<Test, T>& triangles, const RayOf<T>* rays,
+                 HitOf<T>* hits, std::size_t n) {
   if (n == 0) return;
-  constexpr std::size_t rays_a_block = tile_threads * rays_a_thread;
+  constexpr std::size_t rays_a_block = tile_threads * rays_a_thread<T>;
   const auto blocks = static_cast<unsigned>((n + rays_a_block - 1) / rays_a_block);
   trace_tiles_kernel<<<blocks, tile_threads, 0, cuda::as_stream(stream.native())>>>(triangles, rays, hits, n);
   cuda::check(cudaGetLastError(), "trace_tiles_kernel");

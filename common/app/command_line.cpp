@@ -122,6 +122,16 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
   app.add_option("--heatmap", heatmap, "show what a pixel costs: a measure by name")->type_name("MEASURE");
   app.set_config("--config", "", "read flags from a file: name = value, a line each")->type_name("FILE");
   app.allow_config_extras(CLI::config_extras_mode::error);
+  app.add_option("--report", options.report, "run the chapter's experiments, write them into a folder")
+      ->type_name("DIR");
+  app.add_option("--report-budget", options.report_budget, "about how long they may take [600]")
+      ->type_name("SECONDS");
+  app.add_option("--sweep", options.sweeps,
+                 "time and error over a setting's values, for 1, 2, 4 … --samples; twice for two settings")
+      ->type_name("NAME=A,B,…")
+      ->expected(1)
+      ->take_all();
+  app.add_flag("--stability", options.stability, "run the stiff and extreme cases: who fails what, and why");
   app.add_flag("--explain", options.explain, "say what was left out and measure what that saved");
   app.add_flag("--list-settings", options.list_settings, "list the settings with their choices");
   app.add_flag("--list-scenes", options.list_scenes, "list the scenes that have a name");
@@ -150,6 +160,10 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
   require("--samples", options.samples, 1, 1 << 24);
   require("--time", options.seconds, 0.0, 1e6);
   require("--threads", options.threads, 0, 1024);
+  require("--report-budget", options.report_budget, 1.0, 1e6);
+  if (options.sweeps.size() > 2) throw UsageError("--sweep: two settings at most");
+  if (options.stability && !options.sweeps.empty())
+    throw UsageError("--stability and --sweep are two runs; name one of them");
   if (!heatmap.empty()) {
     std::string names;
     bool known = false;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/app/demo.h"
 
@@ -20,6 +21,10 @@ struct Options {
   int threads = 0;                      ///< 0: all
   std::optional<vec3> eye, target, up;  ///< override the scene's camera
   std::optional<float> field_of_view;
+  std::string report;          ///< the folder of a report; empty for none
+  double report_budget = 600;  ///< seconds
+  std::vector<std::string> sweeps;
+  bool stability = false;
   bool explain = false, json = false, quiet = false, list_settings = false, list_scenes = false;
 };
 

@@ -10,6 +10,8 @@
 #include "common/app/settings.h"
 #include "common/image/film.h"
 #include "common/parallel/backend.h"
+#include "common/report/report.h"
+#include "common/report/stability.h"
 #include "common/scene/scene.h"
 
 namespace trilha {
@@ -66,9 +68,14 @@ class Demo {
 
   /// What the last build left out.
   virtual std::vector<Omission> omissions() { return {}; }
+
+  /// What --report measures; nothing of it needs a build of this demo.
+  virtual std::vector<Experiment> experiments() const { return {}; }
+  /// What --stability goes through.
+  virtual std::vector<StabilityCase> extreme_cases() const { return {}; }
 };
 
-/// The main function of every chapter's program.
-int run_program(int argc, char** argv, std::unique_ptr<Demo> demo);
+/// The main function of every chapter's program. Makes a demo for every set of settings that takes turns.
+int run_program(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& make_demo);
 
 }  // namespace trilha

@@ -4,14 +4,17 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
-#include <new>
 #include <nlohmann/json.hpp>
 
 #include "common/app/command_line.h"
 #include "common/app/demo.h"
 #include "common/app/progress.h"
-#include "common/error.h"
+#include "common/app/sweep.h"
+#include "common/guarded.h"
+#include "common/image/files.h"
+#include "common/math/statistics.h"
 #include "common/scene/library.h"
+#include "common/whole_file.h"
 
 namespace trilha {
 namespace {
@@ -104,12 +107,6 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
   outcome.bytes = peak_bytes(stream.backend());
 }
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
-}
-
 /// Measures each omission on an image small enough to take a tenth of a second: five turns of kept and left
 /// out.
 void measure(Demo& demo, const Scene& scene, const Stream& stream, Options options, const Outcome& outcome,
@@ -142,7 +139,7 @@ void measure(Demo& demo, const Scene& scene, const Stream& stream, Options optio
       }
     if (ms[0].size() < 5 || ms[1].size() < 5) return;  // interrupted: the rest stays unmeasured
     saving.bytes = bytes[true] - bytes[false];
-    saving.ms = median(ms[true]) - median(ms[false]);
+    saving.ms = quartiles(ms[true]).median - quartiles(ms[false]).median;
   }
 }
 
@@ -240,9 +237,87 @@ void print_scenes() {
               << "\n";
 }
 
-int run(int argc, char** argv, Demo& demo) {
+/// All backends that are there, or the one that was asked for.
+std::vector<Backend> backends_of(const Options& options) {
+  if (options.backend) return {choose_backend(options)};
+  std::vector<Backend> all{Backend::cpu};
+  if (why_unavailable(Backend::cuda).empty()) all.push_back(Backend::cuda);
+  return all;
+}
+
+/// Ends with a line that scripts may read and people can follow.
+void say_where(const Options& options, const std::string& what) {
+  if (!options.report.empty() && !options.json && !options.quiet)
+    std::cout << what << " " << options.report << "\n";
+}
+
+void run_report(Demo& demo, const Settings& settings, const Options& options,
+                const std::function<std::unique_ptr<Demo>()>& make_demo) {
+  if (!options.report.empty()) make_folder(options.report);
+  Progress progress("measuring", 1, options.quiet || options.json);
+  double shown = 0;
+  ReportOptions how;
+  std::tie(how.chapter, how.title) = demo.name();
+  how.backends = backends_of(options);
+  how.seed = options.seed;
+  how.budget_s = options.report_budget;
+  how.stopped = interrupted;
+  how.progress = [&](double fraction, const std::string&) {
+    progress.advance(fraction - shown);
+    shown = fraction;
+  };
+  Report report(how);
+  if (options.sweeps.empty()) {
+    report.run(demo.experiments());
+  } else {
+    std::vector<Sweep> sweeps;
+    for (const std::string& text : options.sweeps) sweeps.push_back(Sweep::parse(text, settings));
+    const Scene scene = load(options);
+    for (const std::string& warning : scene.warnings) warn(warning);
+    report.run({sweep_experiment(sweeps, settings, scene, choose_backend(options), options.width,
+                                 options.height, options.samples, make_demo)});
+  }
+  for (const std::string& what : report.left_out()) warn("not in the report: " + what);
+  if (!options.report.empty()) report.write(options.report);
+  if (options.json)
+    std::cout << report.json();
+  else if (!options.quiet && !options.sweeps.empty())
+    report.print(std::cout);
+  say_where(options, std::to_string(report.rows().size()) + " rows: report.json and report.csv in");
+}
+
+void run_stability(Demo& demo, const Options& options) {
+  if (!options.report.empty()) make_folder(options.report);
+  const std::vector<StabilityCase> cases = demo.extreme_cases();
+  Progress progress("trying", static_cast<double>(cases.size()), options.quiet || options.json);
+  StabilityTable table;
+  const std::vector<Backend> backends = backends_of(options);
+  for (const StabilityCase& one : cases) {
+    if (interrupted()) {
+      warn("stopped by request: the table holds what was done by then");
+      break;
+    }
+    table.add(one, one.run(backends));
+    progress.advance(1);
+  }
+  if (!options.report.empty()) table.write(options.report, demo.name().first);
+  if (options.json)
+    std::cout << table.json(demo.name().first);
+  else if (!options.quiet)
+    table.print(std::cout);
+  say_where(options, "stability.json and pictures in");
+}
+
+void check_output() {
+  std::cout.flush();
+  if (!std::cout) throw InputError("standard output: cannot be written; is there room for it?");
+}
+
+int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& make_demo) {
   Options options;
   Settings settings;
+  const std::unique_ptr<Demo> made = make_demo();
+  Demo& demo = *made;
   demo.declare_settings(settings);
   if (const auto done = read_command_line(argc, argv, demo, settings, options)) return *done;
   if (options.list_scenes) {
@@ -251,6 +326,16 @@ int run(int argc, char** argv, Demo& demo) {
   }
   catch_interrupts();
   set_thread_count(options.threads);
+  if (options.stability) {
+    run_stability(demo, options);
+    check_output();
+    return 0;
+  }
+  if (!options.report.empty() || !options.sweeps.empty()) {
+    run_report(demo, settings, options, make_demo);
+    check_output();
+    return 0;
+  }
   check_can_write(options.output);
   const Stream stream = choose_backend(options);
   const Scene scene = load(options);
@@ -272,31 +357,14 @@ int run(int argc, char** argv, Demo& demo) {
   if (outcome.samples == 0 && !outcome.stopped)
     warn("--time was too short for one sample a pixel: the image holds what was done by then");
   if (outcome.stopped) warn("stopped by request: the image holds what was done by then");
-  std::cout.flush();
-  if (!std::cout) throw InputError("standard output: cannot be written; is there room for it?");
+  check_output();
   return 0;
 }
 
 }  // namespace
 
-int run_program(int argc, char** argv, std::unique_ptr<Demo> demo) {
-  const auto fail = [&](const std::string& text, int code) {
-    std::cerr << "error: " << text << "\n";
-    return code;
-  };
-  try {
-    return run(argc, argv, *demo);
-  } catch (const InputError& error) {
-    return fail(error.what(), 1);
-  } catch (const UsageError& error) {
-    return fail(error.what(), 2);
-  } catch (const DeviceError& error) {
-    return fail(error.what(), 3);
-  } catch (const std::bad_alloc&) {
-    return fail("not enough memory; a smaller --size or scene needs less", 1);
-  } catch (const std::exception& error) {
-    return fail(std::string("in the program itself: ") + error.what(), 70);
-  }
+int run_program(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& make_demo) {
+  return guarded_main([&] { return run(argc, argv, make_demo); }, "a smaller --size or scene needs less");
 }
 
 }  // namespace trilha

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "common/math/vector.h"
@@ -24,12 +23,10 @@ float srgb_encoded(float light);
 /// Its inverse.
 float srgb_decoded(float display);
 
-/// Is the path a name that write_image knows (.png, .hdr), in a folder that can be written to? Throws
-/// InputError if not: said before an hour of rendering rather than after.
-void check_can_write(const std::string& path);
-
-/// Writes a PNG (eight bits, sRGB) or a Radiance HDR (light as it is). The file appears whole or not at all:
-/// it is written beside its place and then renamed. Throws InputError, with the system's reason.
-void write_image(const std::string& path, const Image& image);
+/// The image as light: display values are clamped to [0, 1] and decoded, light stays as it is.
+Image as_light(Image image);
+/// The image as it is shown: light is clamped to [0, 1] and encoded (NaN is black), display values stay as
+/// they are.
+Image as_display(Image image);
 
 }  // namespace trilha

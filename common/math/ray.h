@@ -14,6 +14,12 @@ struct alignas(4 * sizeof(T)) RayOf {
   T t_min = 0;
   Vec3<T> direction{0, 0, 1};
   T t_max = std::numeric_limits<T>::infinity();
+
+  /// The same ray in another scalar.
+  template <class W>
+  TRILHA_HD RayOf<W> as() const {
+    return {Vec3<W>(origin), static_cast<W>(t_min), Vec3<W>(direction), static_cast<W>(t_max)};
+  }
 };
 using Ray = RayOf<float>;
 
@@ -21,15 +27,17 @@ constexpr std::uint32_t no_primitive = 0xffffffffu;
 
 /// Where a ray meets a primitive: at t, with barycentric coordinates u (of the second vertex) and v (of the
 /// third). A miss has primitive == no_primitive and t == t_max of the ray.
-struct Hit {
-  float t = std::numeric_limits<float>::infinity();
+template <class T>
+struct HitOf {
+  T t = std::numeric_limits<T>::infinity();
   std::uint32_t primitive = no_primitive;
   std::uint32_t instance = 0;
-  float u = 0;
-  float v = 0;
+  T u = 0;
+  T v = 0;
 
   TRILHA_HD bool found() const { return primitive != no_primitive; }
 };
+using Hit = HitOf<float>;
 
 /// Counts what a traversal did; the heat maps and reports read it.
 struct Probe {

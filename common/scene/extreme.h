@@ -1,8 +1,13 @@
 #pragma once
-// Closed meshes whose true surface is known, at any size and place: what the stability cases are made of.
+// Closed meshes whose true surface is known, at any size and place, and the stiff and extreme cases made of
+// them, which every structure and test of the course goes through.
 
 #include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
 
+#include "common/math/ray.h"
 #include "common/scene/mesh.h"
 
 namespace trilha {
@@ -20,5 +25,23 @@ Mesh latitude_longitude_sphere(int slices, int stacks, double scale = 1, const d
 /// triangles that hides parts of itself. 15 slices and stacks give 420 triangles.
 Mesh spiky_sphere(int slices, int stacks, std::uint64_t seed, double scale = 1,
                   const dvec3& centre = dvec3(0));
+
+/// Triangles and the rays that are sent at them: width·height of these, row by row, so that the answers make
+/// a picture.
+struct ExtremeTrial {
+  Mesh mesh;
+  std::vector<Ray> rays;
+  int width, height;
+};
+
+struct ExtremeCase {
+  std::string name;
+  std::string what;  ///< one line: what is extreme about it
+  /// Makes it with pictures of that size; the same bits for the same size.
+  std::function<ExtremeTrial(int width, int height)> make;
+};
+
+/// The cases common to all chapters, ordinary first.
+std::vector<ExtremeCase> extreme_cases();
 
 }  // namespace trilha

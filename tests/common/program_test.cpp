@@ -139,6 +139,13 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
       {"--scene good.obj --time 1 --samples 2", 2, "--samples"},
       {"--scene good.obj --config missing.ini", 1, "missing.ini"},
       {"--scene good.obj --config bad.ini", 2, "no-such-flag"},
+      {"--scene good.obj --sweep test", 2, "name=value"},
+      {"--scene good.obj --sweep no-such-setting=1", 2, "shading"},
+      {"--scene good.obj --sweep test=plane,no-such-test", 2, "watertight"},
+      {"--scene good.obj --sweep test=plane --stability", 2, "--stability"},
+      {"--scene good.obj --report good.obj", 1, "good.obj"},
+      {"--scene good.obj --report /dev/null/report", 1, "/dev/null/report"},
+      {"--report-budget 0", 1, "--report-budget"},
       {"stray", 2, "stray"},
   };
   for (const auto& c : cases) {
@@ -268,4 +275,64 @@ TEST_CASE("a time limit adds samples until it has passed") {
   CHECK(json["render_ms"] < 20000);  // on a machine as busy as it likes
   CHECK(json["stopped"] == false);
   CHECK(json["samples"] > 1);
+}
+
+// Catches: a report that runs over its budget unsaid, rows without error or time, files that are not there.
+TEST_CASE("a report keeps its budget and says what it left out") {
+  Folder folder;
+  const auto start = std::chrono::steady_clock::now();
+  const Result result = run(folder, "--report {}/r --report-budget 4 --backend cpu");
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  INFO(result.err);
+  REQUIRE(result.code == 0);
+  CHECK(seconds < 90);  // sanitizers are slow to reach the next look at the clock
+  const Json json = Json::parse(contents(folder / "r" / "report.json"));
+  CHECK(json["budget_s"] == 4);
+  CHECK(json["left_out"].size() > 0);
+  CHECK(result.err.find("not in the report") != std::string::npos);
+  for (const Json& row : json["rows"]) {
+    CHECK(row["error"]["kind"].is_string());
+    CHECK(row["errors"].size() > 0);
+    CHECK(row["time_ms"]["repeats"] >= 5);
+    CHECK(row["time_ms"]["median"] > 0);
+  }
+  CHECK(fs::exists(folder / "r" / "report.csv"));
+}
+
+// Catches: a sweep that does not change the setting, that changes another, or whose error is not the
+// picture's.
+TEST_CASE("a sweep makes a row for every combination and number of samples") {
+  Folder folder;
+  write(folder / "good.obj", triangle);
+  const Result result = run(folder,
+                            "--scene good.obj --backend cpu --size 48x32 --samples 4 --json "
+                            "--sweep test=plane,watertight --sweep shading=lambert,facing");
+  INFO(result.err);
+  REQUIRE(result.code == 0);
+  const Json json = Json::parse(result.out);
+  REQUIRE(json["rows"].size() == 2 * 2 * 3);
+  for (const Json& row : json["rows"]) {
+    const double rmse = row["error"]["value"], floor = row["errors"][1]["value"];
+    CHECK(row["technique"] ==
+          row["settings"]["test"].get<std::string>() + ", " + row["settings"]["shading"].get<std::string>());
+    if (row["settings"]["shading"] == "lambert")
+      CHECK(rmse < 0.05);  // the reference has the base settings
+    else
+      CHECK(rmse > 0.06);
+    CHECK(floor < 0.05);
+  }
+}
+
+// Catches: a stability table that is not there, or that does not say all it knows.
+TEST_CASE("the stability table goes to the terminal and to files") {
+  trilha::testing::require_meaningful_times();  // sanitizers take minutes: the cases themselves run elsewhere
+  Folder folder;
+  const Result result = run(folder, "--stability --backend cpu --report {}/s");
+  INFO(result.err);
+  REQUIRE(result.code == 0);
+  CHECK(result.out.find("watertight") != std::string::npos);
+  CHECK(result.out.find("(!)") == std::string::npos);
+  const Json json = Json::parse(contents(folder / "s" / "stability.json"));
+  CHECK(json["rows"].size() >= 16 * 4);
+  for (const Json& row : json["rows"]) CHECK(fs::exists(folder / "s" / row["picture"].get<std::string>()));
 }

@@ -1,8 +1,6 @@
 #include "common/app/settings.h"
 
 #include "common/error.h"
-#include "common/image/colour_map.h"
-#include "common/image/image.h"
 #include "tests/testing.h"
 
 using namespace trilha;
@@ -45,28 +43,4 @@ TEST_CASE("a setting reads back what it shows, and refuses the rest") {
   CHECK_THROWS_AS(settings["fruit"].set_text("plum"), UsageError);
   CHECK(count == 10);
   CHECK_THROWS(settings.flag("flag", flag, Effect::none, "again"));
-}
-
-// Catches: a transfer function that is linear, or wrong at its ends; NaN that reaches a file.
-TEST_CASE("colours are encoded as sRGB says") {
-  CHECK(srgb_encoded(0) == 0);
-  CHECK(srgb_encoded(1) == Approx(1));
-  CHECK(srgb_encoded(0.214041f) == Approx(0.5).margin(1e-5));
-  CHECK(srgb_encoded(0.002f) == Approx(0.02584));
-  CHECK(srgb_encoded(-1) == 0);
-  CHECK(srgb_encoded(7) == Approx(1));
-  for (float x = 0; x <= 1; x += 1.0f / 64) CHECK(srgb_encoded(srgb_decoded(x)) == Approx(x).margin(1e-6));
-  CHECK(srgb_encoded(std::nanf("")) == 0);
-}
-
-// Catches: a colour map that is not monotonic in lightness, which is what makes it readable without colour.
-TEST_CASE("viridis grows lighter all the way") {
-  float last = -1;
-  for (int k = 0; k <= 100; ++k) {
-    const vec3 c = viridis(static_cast<float>(k) / 100);
-    const float lightness = 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z;
-    CHECK(lightness > last);
-    last = lightness;
-  }
-  CHECK(viridis(std::nanf("")) == vec3(1, 0, 1));
 }

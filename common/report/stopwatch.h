@@ -1,0 +1,34 @@
+#pragma once
+// Times that can be compared: everything that is compared takes turns.
+
+#include <functional>
+#include <vector>
+
+#include "common/parallel/backend.h"
+
+namespace trilha {
+
+/// The median and quartiles of repeated measurements, in milliseconds.
+struct Times {
+  double median = 0, q1 = 0, q3 = 0;
+  int repeats = 0;
+};
+
+Times summary(const std::vector<double>& ms);
+
+/// How pieces of work are timed against each other.
+struct Turns {
+  int repeats = 7;       ///< measurements of each piece
+  double least_ms = 10;  ///< a measurement runs the work again and again until it has taken so long
+  /// Asked before each measurement; false ends the turns early.
+  std::function<bool()> keep_going = [] { return true; };
+};
+
+/// The time of one run of each piece of work on the stream. Every piece is run once to warm up, which shows
+/// how many runs make a measurement; then they take turns, so that whatever slows the machine for a while
+/// slows all of them, and each turn starts one piece further. Device work is timed by events. Fewer repeats
+/// than asked for mean that it was stopped.
+std::vector<Times> take_turns(const Stream& stream, const std::vector<std::function<void()>>& work,
+                              const Turns& turns = {});
+
+}  // namespace trilha
