@@ -33,8 +33,9 @@ try:
     from matplotlib.patheffects import withStroke
     from matplotlib.text import Text
     from matplotlib.textpath import TextToPath
+    from matplotlib.transforms import Affine2D
 except ImportError as missing:
-    sys.exit(f"error: plotting needs matplotlib (package python3-matplotlib, for /usr/bin/python3): {missing}")
+    sys.exit(f"error: plotting needs matplotlib (python3-matplotlib, for /usr/bin/python3): {missing}")
 
 matplotlib.rcdefaults()  # the reader's own matplotlibrc must not change a figure
 matplotlib.rcParams.update({"svg.hashsalt": "trilha", "svg.fonttype": "path", "font.family": "DejaVu Sans",
@@ -44,15 +45,17 @@ warnings.filterwarnings("ignore", message="Glyph .* missing")
 WIDTH = 504.0  # a column of print, 7 inches
 TALLEST = 684.0  # 9.5 inches: what is taller goes to a further page
 MARGIN = 12.0
+INNER = WIDTH - 2 * MARGIN
 DPI = 200
 PIXEL = 72 / DPI
 SMALL = 8.0  # the smallest type
 
 CARD, INK, GREY, FAINT, BAND, FRONT = "#fdfdfb", "#222222", "#666666", "#e4e3de", "#f1efe8", "#c9c7be"
-# Okabe and Ito's colours, which the colour-blind can tell apart, ordered so that the first ones also differ in
-# lightness, for prints without colour. Yellow is missing: it does not show on paper.
+# Okabe and Ito's colours, which the colour-blind can tell apart, ordered so that the first ones also differ
+# in lightness, for prints without colour. Yellow is missing: it does not show on paper.
 COLOURS = ["#0072b2", "#e69f00", "#000000", "#009e73", "#d55e00", "#56b4e9", "#cc79a7"]
-DASHES = [(0, ()), (0, (5, 1.6)), (0, (1.2, 1.4)), (0, (6, 1.6, 1.2, 1.6)), (0, (3, 1, 1, 1, 1, 1)), (0, (9, 2)), (0, (2, 3))]
+DASHES = [(0, ()), (0, (5, 1.6)), (0, (1.2, 1.4)), (0, (6, 1.6, 1.2, 1.6)), (0, (3, 1, 1, 1, 1, 1)),
+          (0, (9, 2)), (0, (2, 3))]
 SHAPES = ["o", "s", "^", "D", "v", "P", "X", "p", "h", "<", ">", "*"]
 
 
@@ -61,7 +64,8 @@ def ink(colour):
     rgb = np.array([int(colour[i:i + 2], 16) / 255 for i in (1, 3, 5)])
 
     def luminance(parts):
-        return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722]
+        return np.where(parts <= 0.04045, parts / 12.92,
+                        ((parts + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722]
 
     while 1.05 / (luminance(rgb) + 0.05) < 4.6:
         rgb = rgb * 0.96
@@ -180,15 +184,20 @@ def read_row(raw, where):
 def read_axis(experiment, name, where):
     axis = need(experiment, name, where, dict)
     quantity = need(axis, "quantity", f"{where}.{name}", str)
-    if quantity not in QUANTITIES and quantity != "error" and not quantity.startswith(("error.", "settings.")):
-        raise Refused(f"{where}.{name}: no quantity is called {quantity}; there are: {', '.join(QUANTITIES)}, "
-                      "error, error.KIND, settings.NAME")
-    return {"quantity": quantity, "label": str(axis.get("label") or quantity), "log": axis.get("log", True) is not False}
+    free = quantity == "error" or quantity.startswith(("error.", "settings."))
+    if quantity not in QUANTITIES and not free:
+        raise Refused(
+            f"{where}.{name}: no quantity is called {quantity}; there are: {', '.join(QUANTITIES)}, "
+            "error, error.KIND, settings.NAME")
+    log = axis.get("log", True) is not False
+    return {"quantity": quantity, "label": str(axis.get("label") or quantity), "log": log}
 
 
 def read_experiment(raw, where):
-    experiment = {"name": need(raw, "name", where, str), "rows_of": str(raw.get("rows_of") or raw["name"]), "title": str(raw.get("title") or raw["name"]),
-                  "note": str(raw.get("note") or ""), "join": raw.get("join", False) is True,
+    name = need(raw, "name", where, str)
+    experiment = {"name": name, "rows_of": str(raw.get("rows_of") or name),
+                  "title": str(raw.get("title") or name), "note": str(raw.get("note") or ""),
+                  "join": raw.get("join", False) is True,
                   "x": read_axis(raw, "x", where), "y": read_axis(raw, "y", where)}
     for name in ("figure", "panel", "line", "mark"):
         fields = raw.get(name) or []
@@ -196,8 +205,8 @@ def read_experiment(raw, where):
             raise Refused(f'{where}: "{name}" is not a list')
         for field in fields:
             if field not in ("scene", "backend", "technique") and not str(field).startswith("settings."):
-                raise Refused(f"{where}.{name}: no field is called {field}; there are: scene, backend, technique, "
-                              "settings.NAME")
+                raise Refused(f"{where}.{name}: no field is called {field}; there are: scene, backend, "
+                              "technique, settings.NAME")
         experiment[name] = fields
     return experiment
 
@@ -232,7 +241,8 @@ def read_report(path):
         for quantity in (experiment["x"]["quantity"], experiment["y"]["quantity"]):
             for i, row in enumerate(rows):
                 if quantity.startswith("settings.") and row["experiment"] == experiment["rows_of"]:
-                    number(row["settings"].get(quantity[9:]), f"{path}: rows[{i}].{quantity}, an axis of {experiment['name']}")
+                    number(row["settings"].get(quantity[9:]),
+                           f"{path}: rows[{i}].{quantity}, an axis of {experiment['name']}")
     return {**report, "path": path, "rows": rows, "experiments": experiments,
             "left_out": [str(what) for what in left_out]}
 
@@ -246,7 +256,8 @@ def time_of(row, times=1.0, plus=0.0):
     time = row["time_ms"]
     if time is None or time["median"] is None or times is None or plus is None:
         return None
-    return Measure(*(None if time[name] is None else time[name] * times + plus for name in ("median", "q1", "q3")))
+    names = ("median", "q1", "q3")
+    return Measure(*(None if time[name] is None else time[name] * times + plus for name in names))
 
 
 def count_of(row, name):
@@ -273,8 +284,10 @@ QUANTITIES = {
     **{name: (lambda row, name=name: count_of(row, name)) for name in COUNTS},
 }
 # A front is drawn where less is better on both axes.
-LESS_IS_BETTER = {"time_ms", "total_ms", "ns_per_test", "ns_per_ray", "ms_per_ray", "tests_per_ray", "nodes_per_ray",
-                  "build_ms", "bytes"}
+LESS_IS_BETTER = {
+    "time_ms", "total_ms", "ns_per_test", "ns_per_ray", "ms_per_ray", "tests_per_ray", "nodes_per_ray",
+    "build_ms", "bytes"
+}
 
 
 def less_is_better(quantity):
@@ -300,10 +313,14 @@ def measure(row, quantity):
     return found
 
 
+def machine(backend):
+    return {"cpu": "CPU", "cuda": "CUDA"}.get(backend, backend)
+
+
 def words_of(row, field):
     """A field's value as it stands in titles and labels."""
     if field == "backend":
-        return {"cpu": "CPU", "cuda": "CUDA"}.get(row["backend"], row["backend"])
+        return machine(row["backend"])
     if not field.startswith("settings."):
         return row[field]
     name = field[9:]
@@ -426,11 +443,8 @@ class Sheet:
         self.ids = Counter()
         self.panels, self.missing = [], []
         self.card = "#ffffff" if paper else CARD
-        # An opaque card: GitHub shows it on black as well as on white, and grey ink would vanish on one of them.
-        if paper:
-            self.add(Rectangle((0, 0), WIDTH, self.height, fc=self.card, lw=0), "card")
-        else:
-            self.add(FancyBboxPatch((0, 0), WIDTH, self.height, "round,pad=0,rounding_size=6", fc=self.card, lw=0), "card")
+        # An opaque card: GitHub shows it on black as well as on white, and ink would vanish on one of them.
+        self.box(0, 0, WIDTH, self.height, self.card, "card", rounding=0 if paper else 6)
 
     def add(self, artist, name=None, order=1):
         """Adds an artist. Names become ids in the SVG, where each may occur once."""
@@ -443,24 +457,27 @@ class Sheet:
         artist.set_clip_on(False)
         return artist
 
-    def text(self, x, y, text, size=SMALL, colour=INK, weight="normal", align="left", name="text", maths=False, halo=False,
-             style="normal"):
+    def text(self, x, y, text, size=SMALL, colour=INK, weight="normal", align="left", name="text",
+             maths=False, halo=False, style="normal"):
         """Writes on the baseline y."""
-        artist = Text(x, y, text, color=colour, fontproperties=font(size, weight, style), ha=align, va="baseline")
+        artist = Text(x, y, text, color=colour, fontproperties=font(size, weight, style))
+        artist.set(ha=align, va="baseline")
         artist.set_parse_math(maths)
         if halo:
             artist.set_path_effects([withStroke(linewidth=2.2, foreground=self.card)])
         return self.add(artist, name, 10)
 
     def line(self, xs, ys, colour=INK, width=0.6, name=None, order=2, dashes=(0, ()), **more):
-        return self.add(Line2D(xs, ys, color=colour, lw=width, ls=dashes, solid_capstyle="butt", **more), name, order)
+        return self.add(Line2D(xs, ys, color=colour, lw=width, ls=dashes, solid_capstyle="butt", **more),
+                        name, order)
 
     def points(self, xs, ys, style, size, name, order=6):
         """Markers without a line. A thin edge in the card's colour keeps neighbours apart."""
-        edge = self.card if style.filled else style.colour
-        return self.add(Line2D(xs, ys, ls="none", marker=style.shape, ms=size * (1.12 if style.shape in "^v<>pPX*" else 1),
-                               mfc=style.colour if style.filled else self.card, mec=edge,
-                               mew=1.0 if not style.filled else 0.5 if size > 3 else 0.0), name, order)
+        edge, fill = (self.card, style.colour) if style.filled else (style.colour, self.card)
+        width = 1.0 if not style.filled else 0.5 if size > 3 else 0.0
+        size *= 1.12 if style.shape in "^v<>pPX*" else 1  # these look smaller than they are
+        return self.add(Line2D(xs, ys, ls="none", marker=style.shape, ms=size, mfc=fill, mec=edge, mew=width),
+                        name, order)
 
     def bars(self, segments, colour, name, width=0.9, order=4):
         """Many separate strokes as one artist."""
@@ -469,23 +486,27 @@ class Sheet:
         return self.line(xs, ys, colour, width, name, order)
 
     def box(self, x, y, width, height, colour, name=None, order=1, edge="none", line=0.0, rounding=0.0):
-        shape = (FancyBboxPatch((x, y), width, height, f"round,pad=0,rounding_size={rounding}") if rounding else
-                 Rectangle((x, y), width, height))
+        shape = Rectangle((x, y), width, height)
+        if rounding:
+            shape = FancyBboxPatch((x, y), width, height, f"round,pad=0,rounding_size={rounding}")
         shape.set(fc=colour, ec=edge, lw=line)
         return self.add(shape, name, order)
 
     def picture(self, x, y, width, height, pixels, name):
-        artist = AxesImage(self.axes, extent=(x, x + width, y, y + height), interpolation="nearest", resample=False)
+        artist = AxesImage(self.axes, extent=(x, x + width, y, y + height), interpolation="nearest",
+                           resample=False)
         artist.set_data(pixels)
         return self.add(artist, name, 3)
 
     def svg(self):
         file = io.StringIO()
         self.figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
-        escape = lambda text: text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-        start = re.search(r"<svg [^>]*", file.getvalue())
-        return (file.getvalue()[:start.end()] + ' role="img">\n <title>' + escape(self.title) + "</title>\n <desc>" +
-                escape(self.description) + "</desc>" + file.getvalue()[start.end() + 1:]).encode()
+        svg = file.getvalue()
+        end = re.search(r"<svg [^>]*", svg).end()
+        words = [text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+                 for text in (self.title, self.description)]
+        head = f' role="img">\n <title>{words[0]}</title>\n <desc>{words[1]}</desc>'
+        return (svg[:end] + head + svg[end + 1:]).encode()
 
     def png(self):
         file = io.BytesIO()
@@ -507,13 +528,16 @@ class Scale:
         self.log, self.length = log, length
         low = any(value == 0 if log else value == -math.inf for value in values)
         high = any(value == math.inf for value in values)
-        self.rails = ([(RAIL / 2, "0" if log else "−∞")] if low else []) + ([(length - RAIL / 2, "∞")] if high else [])
+        self.rails = [(RAIL / 2, "0" if log else "−∞")] if low else []
+        self.rails += [(length - RAIL / 2, "∞")] if high else []
         self.has_low, self.has_high = low, high
         self.start = RAIL + GAP if low else 0.0
         self.stop = length - (RAIL + GAP if high else 0.0)
-        shown = [self.straight(value) for value in values if math.isfinite(value) and not (log and value == 0)]
+        shown = [self.straight(value) for value in values
+                 if math.isfinite(value) and not (log and value == 0)]
         self.low, self.high = (min(shown), max(shown)) if shown else (0.0, 1.0)
-        least = 0.3 if log else max(abs(self.low) * 1e-3, 1e-300)  # a spread of nothing but noise is not blown up
+        # A spread of nothing but noise is not blown up.
+        least = 0.3 if log else max(abs(self.low) * 1e-3, 1e-300)
         if self.high - self.low < least:
             middle, half = (self.low + self.high) / 2, least / 2
             if not log and middle == 0:
@@ -537,7 +561,8 @@ class Scale:
 
     def edges(self):
         """Where the rails and the main part begin and end."""
-        return ([RAIL, self.start] if self.has_low else []) + ([self.stop, self.length - RAIL] if self.has_high else [])
+        low = [RAIL, self.start] if self.has_low else []
+        return low + ([self.stop, self.length - RAIL] if self.has_high else [])
 
     def ticks(self, spacing):
         """The labelled ticks, as (points, text, whether it is mathematics), and the points of the others."""
@@ -545,18 +570,23 @@ class Scale:
         reach = PAD / unit
         low, high = self.low - reach, self.high + reach
         if not self.log:
-            return [(self.along(value), text, False) for value, text in round_values(low, high, spacing / unit)], []
+            round_ones = round_values(low, high, spacing / unit)
+            return [(self.along(value), text, False) for value, text in round_ones], []
         decades = range(math.ceil(low), math.floor(high) + 1)
         if len(decades) < 4 and unit * 0.47 > spacing:  # room for 1, 2 and 5, or for 1 and 3
-            some = [(m, k) for k in range(math.floor(low), math.ceil(high) + 1)
-                    for m in ((1, 2, 5) if unit * 0.3 > spacing else (1, 3)) if low <= math.log10(m) + k <= high]
+            some = powers((1, 2, 5) if unit * 0.3 > spacing else (1, 3), low, high)
             if len(some) >= 2:
                 short = all(-5 < k < 5 for _, k in some)
-                return [(self.along(math.log10(m) + k), *power_text(m, k, short)) for m, k in some], self.between(low, high)
+                return ([(self.along(math.log10(m) + k), *power_text(m, k, short)) for m, k in some],
+                        self.between(low, high))
         if len(decades) < 2 and -300 < low and high < 300:
-            some = round_values(10 ** low, 10 ** high, (10 ** high - 10 ** low) * spacing / (unit * (high - low)))
-            some = [(self.along(math.log10(value)), text, False) for value, text in some if value > 0]
-            return [tick for i, tick in enumerate(some) if i == 0 or tick[0] - some[i - 1][0] > spacing * 0.6], []
+            span = 10 ** high - 10 ** low
+            ticks = []
+            for value, text in round_values(10 ** low, 10 ** high, span * spacing / (unit * (high - low))):
+                at = self.along(math.log10(value)) if value > 0 else -math.inf
+                if at - (ticks[-1][0] if ticks else -1e9) > spacing * 0.6:
+                    ticks.append((at, text, False))
+            return ticks, []
         step = next((step for step in (1, 2, 3, 5, 10, 20, 50, 100, 200) if step * unit >= spacing), 500)
         labelled = [k for k in decades if k % step == 0]
         if len(labelled) < 2:
@@ -566,13 +596,18 @@ class Scale:
         return texts, self.between(low, high) if step == 1 and unit > 20 else [self.along(k) for k in decades]
 
     def between(self, low, high):
-        return [self.along(math.log10(m) + k) for k in range(math.floor(low), math.ceil(high) + 1) for m in range(1, 10)
-                if low <= math.log10(m) + k <= high]
+        return [self.along(math.log10(m) + k) for m, k in powers(range(1, 10), low, high)]
+
+
+def powers(mantissas, low, high):
+    """The (m, k) for which m·10^k lies between 10^low and 10^high, in order."""
+    return [(m, k) for k in range(math.floor(low), math.ceil(high) + 1) for m in mantissas
+            if low <= math.log10(m) + k <= high]
 
 
 def ticks_across(scale):
-    """The ticks of an x axis, as far apart as their texts need. A text that hangs over the panel's sides would meet
-    the next panel's and is left out."""
+    """The ticks of an x axis, as far apart as their texts need. A text that hangs over the panel's sides
+    would meet the next panel's and is left out."""
     spacing = max(30.0, scale.length / 8)
     while True:
         ticks, minor = scale.ticks(spacing)
@@ -605,8 +640,8 @@ def round_values(low, high, spacing):
 
 
 def pareto_front(points):
-    """The indices of the points (x, y) that no other beats: none is at most as large in both and smaller in one.
-    In the order of x. What is infinite or not a number is no achievement and never on the front."""
+    """The indices of the points (x, y) that no other beats: none is at most as large in both and smaller in
+    one. In the order of x. What is infinite or not a number is no achievement and never on the front."""
     order = sorted((x, y, i) for i, (x, y) in enumerate(points) if math.isfinite(x) and math.isfinite(y))
     front, last = [], None
     for x, y, i in order:
@@ -622,7 +657,8 @@ CROWD = 400  # with more points in a panel nothing is labelled beside them
 
 # Around a point: close by, then on rings, there with a leader line.
 CLOSE = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)]
-RINGS = [(radius, 2 * math.pi * i / 24) for radius in (9, 15, 22, 30, 39, 49, 60, 72, 85, 100) for i in range(24)]
+RADII = (9, 15, 22, 30, 39, 49, 60, 72, 85, 100)
+RINGS = [(radius, 2 * math.pi * i / 24) for radius in RADII for i in range(24)]
 
 
 def overlaps(boxes, others):
@@ -630,7 +666,8 @@ def overlaps(boxes, others):
     if len(others) == 0:
         return np.zeros(len(boxes), bool)
     a, b = np.asarray(boxes)[:, None, :], np.asarray(others)[None, :, :]
-    return ((a[..., 0] < b[..., 2]) & (b[..., 0] < a[..., 2]) & (a[..., 1] < b[..., 3]) & (b[..., 1] < a[..., 3])).any(1)
+    return ((a[..., 0] < b[..., 2]) & (b[..., 0] < a[..., 2]) & (a[..., 1] < b[..., 3]) &
+            (b[..., 1] < a[..., 3])).any(1)
 
 
 def crosses(boxes, segments):
@@ -669,7 +706,8 @@ class Obstacles:
 
     def copy(self):
         copy = Obstacles(self.area)
-        copy.boxes, copy.segments, copy.soft, copy.taken = (list(part) for part in (self.boxes, self.segments, self.soft, self.taken))
+        copy.boxes, copy.segments = list(self.boxes), list(self.segments)
+        copy.soft, copy.taken = list(self.soft), list(self.taken)
         return copy
 
     def clear(self, x, y, radius, end):
@@ -678,12 +716,13 @@ class Obstacles:
         others = self.taken + [box for box in self.boxes if not overlaps(own, [box])[0]]
         if others and crosses(np.array(others), [(x, y, *end)]).any():
             return False
-        return not crossed((x, y, *end), [segment for segment in self.segments if not crosses(own, [segment])[0]])
+        strange = [segment for segment in self.segments if not crosses(own, [segment])[0]]
+        return not crossed((x, y, *end), strange)
 
     def find(self, width, height, anchors, strangers=(), far=True, aloof=False):
-        """A free box for a label, and the anchor it belongs to: (box, anchor, whether it needs a leader), or None.
-        Anchors are (x, y, radius, cost), strangers segments. Near a stranger a label would seem to be the stranger's:
-        it avoids them, or, if aloof, refuses them."""
+        """A free box for a label, and the anchor it belongs to: (box, anchor, whether it needs a leader), or
+        None. Anchors are (x, y, radius, cost), strangers segments. Near a stranger a label would seem to be
+        the stranger's: it avoids them, or, if aloof, refuses them."""
         candidates, facts = [], []
         for index, (x, y, radius, cost) in enumerate(anchors):
             for i, (sx, sy) in enumerate(CLOSE):
@@ -730,7 +769,8 @@ class Obstacles:
 # --- experiments
 
 Style = namedtuple("Style", "colour dashes shape filled")
-Point = namedtuple("Point", "x y px py x_bar y_bar line style row")  # x, y: values; the rest: points, bars None or (low, high)
+# x and y are values, px and py where they stand in the panel; a bar is None or (low, high), there too.
+Point = namedtuple("Point", "x y px py x_bar y_bar line style row")
 
 
 class Styles:
@@ -742,7 +782,9 @@ class Styles:
     def of(self, line, shape=None, filled=True):
         i = self.order.setdefault(line, len(self.order))
         n = len(COLOURS)
-        return Style(COLOURS[i % n], DASHES[(i + i // n) % len(DASHES)], shape or SHAPES[(i + i // n) % len(SHAPES)], filled)
+        other = i + i // n  # the second round of colours comes with other dashes and shapes
+        return Style(COLOURS[i % n], DASHES[other % len(DASHES)], shape or SHAPES[other % len(SHAPES)],
+                     filled)
 
 
 def mark_code(rows, fields):
@@ -762,11 +804,18 @@ class Panel:
         self.points, self.published, self.floors, self.front, self.labels = [], [], [], [], []
 
 
-def pages_of(names):
-    """Panel names shared out evenly on pages of at most 15."""
-    pages = max(1, math.ceil(len(names) / 15))
-    size = math.ceil(len(names) / pages)
-    return [names[i:i + size] for i in range(0, len(names), size)]
+def parts(items, size):
+    """Shared out evenly, at most so many at a time."""
+    count = max(1, math.ceil(len(items) / size))
+    size = max(1, math.ceil(len(items) / count))
+    return [items[i:i + size] for i in range(0, len(items), size)]
+
+
+def numbered(name, count):
+    """The names of so many pages, and which of how many each is: nothing where there is one."""
+    if count == 1:
+        return [(name, "")]
+    return [(f"{name}_{i + 1}", f"{i + 1} of {count}") for i in range(count)]
 
 
 def floors_of(rows, quantity):
@@ -810,12 +859,12 @@ def footer_of(document, rows, backends):
     for name in ("revision", "seed"):
         if document.get(name) is not None:
             parts.append(f"{name} {document[name]}")
-    repeats = sorted({int(row["time_ms"]["repeats"]) for row in rows
-                      if row.get("time_ms") and row["time_ms"]["repeats"] and math.isfinite(row["time_ms"]["repeats"])})
+    repeats = [row["time_ms"]["repeats"] for row in rows if row["time_ms"]]
+    repeats = sorted({int(count) for count in repeats if count and math.isfinite(count)})
     if repeats:
         span = str(repeats[0]) if len(repeats) == 1 else f"{repeats[0]}–{repeats[-1]}"
         parts.append(f"{span} repeat{'s' if repeats[-1] > 1 else ''}: medians, quartiles")
-    return wrap_parts(parts, WIDTH - 2 * MARGIN)
+    return wrap_parts(parts, INNER)
 
 
 def row_name(row, experiment):
@@ -833,16 +882,16 @@ def draw_experiment(report, experiment, styles, paper=False):
         figures.setdefault(words(row, experiment["figure"]), []).append(row)
     sheets = []
     for title, members in figures.items():
-        name = experiment["name"] + ("_" + "_".join(words_of(members[0], field) for field in experiment["figure"])
-                                     if experiment["figure"] else "")
+        name = "_".join([experiment["name"]] +
+                        [words_of(members[0], field) for field in experiment["figure"]])
         panels = {}
         for row in members:
             panels.setdefault(words(row, experiment["panel"]), []).append(row)
-        pages = pages_of(list(panels))
-        for i, page in enumerate(pages):
-            part = f"{i + 1} of {len(pages)}" if len(pages) > 1 else ""
-            sheet = draw_figure(report, experiment, title, part, {key: panels[key] for key in page}, members, styles, code, paper)
-            sheets.append((name + (f"_{i + 1}" if part else ""), sheet))
+        pages = parts(list(panels), 15)
+        for page, (name, part) in zip(pages, numbered(name, len(pages))):
+            here = {key: panels[key] for key in page}
+            sheet = draw_figure(report, experiment, title, part, here, members, styles, code, paper)
+            sheets.append((name, sheet))
     return sheets
 
 
@@ -883,15 +932,17 @@ def draw_figure(report, experiment, title, part, panels, all_rows, styles, code,
     lines = list(dict.fromkeys(words(row, experiment["line"]) for rows in panels.values() for row in rows
                                if measure(row, x["quantity"]) and measure(row, y["quantity"])))
 
-    # Names of lines stand beside them; if that does not work out in every panel, in a gutter to the right of each,
-    # or further off with a leader; else in a key. Labels are tried on panels that lie at zero and find their place
-    # on the sheet afterwards.
+    # Names of lines stand beside them; if that does not work out in every panel, in a gutter to the right of
+    # each, or further off with a leader; else in a key. Labels are tried on panels that lie at zero and find
+    # their place on the sheet afterwards.
     gutter = 16 + max([width_of(line) for line in lines] + [0.0])
     for labelling in ("beside", "gutter", "leaders", "key"):
         aside = gutter if labelling == "gutter" else 0.0
         width = (WIDTH - MARGIN - left - columns * aside - (columns - 1) * gap) / columns
-        if (labelling == "gutter" and (width < 120 or not experiment["join"])) or (labelling == "leaders" and len(panels) > 4):
-            continue  # short of room, or a thicket of leaders
+        if labelling == "gutter" and (width < 120 or not experiment["join"]):
+            continue
+        if labelling == "leaders" and len(panels) > 4:
+            continue  # they would be a thicket
         x_scale = Scale(extents["x"], x["log"], width, f"{where}.x")
         layout = []
         for i, (name, rows) in enumerate(panels.items()):
@@ -909,22 +960,27 @@ def draw_figure(report, experiment, title, part, panels, all_rows, styles, code,
     for name, rows in panels.items():
         gone = [row for row in rows if not (measure(row, x["quantity"]) and measure(row, y["quantity"]))]
         missing += gone
-        names += [f"all of {name}"] if len(gone) == len(rows) and titled else [row_name(row, experiment) for row in gone]
-    inner = WIDTH - 2 * MARGIN
-    header = wrap(experiment["title"] + (f" · {title}" if title else "") + (f" ({part})" if part else ""), inner, 2, 11, "bold")
-    notes = wrap(experiment["note"], inner, 3)
+        if len(gone) == len(rows) and titled:
+            names.append(f"all of {name}")
+        else:
+            names += [row_name(row, experiment) for row in gone]
+    titles = experiment["title"] + (f" · {title}" if title else "") + (f" ({part})" if part else "")
+    header = wrap(titles, INNER, 2, 11, "bold")
+    notes = wrap(experiment["note"], INNER, 3)
     below = []
     if missing:
-        below += wrap(f"{len(missing)} row{'s' if len(missing) > 1 else ''} without a number: " + ", ".join(dict.fromkeys(names)),
-                      inner, 3)
-    hardware = dict.fromkeys((row["published"]["by"], row["published"]["hardware"]) for rows in panels.values()
-                             for row in rows if row["published"] and row["published"]["hardware"])
+        names = ", ".join(dict.fromkeys(names))
+        below += wrap(f"{len(missing)} row{'s' if len(missing) > 1 else ''} without a number: {names}", INNER,
+                      3)
+    hardware = dict.fromkeys((row["published"]["by"], row["published"]["hardware"])
+                             for rows in panels.values() for row in rows
+                             if row["published"] and row["published"]["hardware"])
     if hardware:
-        below += wrap("Published: " + "; ".join(f"{by} on {what}" for by, what in hardware), inner, 2)
+        below += wrap("Published: " + "; ".join(f"{by} on {what}" for by, what in hardware), INNER, 2)
     left_out = [what[len(experiment["rows_of"]) + 2:] for what in report["left_out"]
                 if what.startswith(experiment["rows_of"] + ": ")]
     if left_out:
-        below += wrap("Left out: " + "; ".join(left_out), inner, 2)
+        below += wrap("Left out: " + "; ".join(left_out), INNER, 2)
     backends = list(dict.fromkeys(row["backend"] for rows in panels.values() for row in rows))
     footer = footer_of(report, [row for rows in panels.values() for row in rows], backends)
 
@@ -938,17 +994,19 @@ def draw_figure(report, experiment, title, part, panels, all_rows, styles, code,
     for i, (value, filled) in enumerate(zip(fills, (True, False))):
         keys.append(("mark", value, Style(GREY, None, "o", filled), field_name([fill]) if i == 0 else ""))
     for i, value in enumerate(shapes):
-        keys.append(("mark", value, Style(GREY, None, SHAPES[i % len(SHAPES)], True), field_name(shape) if i == 0 else ""))
+        style = Style(GREY, None, SHAPES[i % len(SHAPES)], True)
+        keys.append(("mark", value, style, field_name(shape) if i == 0 else ""))
     if any(panel.published for panel in layout):
         keys.append(("mark", "published", Style(GREY, None, "D", False), ""))
-    key_rows = flow([(kind, fit(text, 150), style, fit(group, 100)) for kind, text, style, group in keys], inner,
-                    experiment["join"])
+    key_rows = flow([(kind, fit(text, 150), style, fit(group, 100)) for kind, text, style, group in keys],
+                    INNER, experiment["join"])
 
     top = 11 + len(header) * 15 + len(notes) * 11 + len(key_rows) * 13 + 16
     cell = height + (15 if titled else 5)
     bottom = 15 + 14 + len(below) * 11 + 6 + len(footer) * 11 + 7
     total = top + across * cell + (across - 1) * 6 + bottom
-    description = (f"{experiment['note']} {y['label']} over {x['label']}; {sum(len(panel.points) for panel in layout)} points; "
+    count = sum(len(panel.points) for panel in layout)
+    description = (f"{experiment['note']} {y['label']} over {x['label']}; {count} points; "
                    f"lines: {', '.join(lines)}. {' '.join(footer)}").strip()
     sheet = Sheet(total, " ".join(header), description, paper)
     sheet.panels, sheet.missing = layout, missing
@@ -969,14 +1027,15 @@ def draw_figure(report, experiment, title, part, panels, all_rows, styles, code,
         draw_keys(sheet, row, at, experiment["join"])
         at -= 3
     at -= 9
-    sheet.text(MARGIN, at, fit(y["label"], inner), name="y-label")
+    sheet.text(MARGIN, at, fit(y["label"], INNER), name="y-label")
     first = total - top
     for panel in layout:
         panel.y = first - panel.row * (cell + 6) - cell
         draw_panel(sheet, panel, experiment, x_scale, y_scale, x_ticks, y_ticks, titled)
     at = first - across * cell - (across - 1) * 6 - 15 - 11
-    label = fit(x["label"], inner)
-    sheet.text(min((left + WIDTH - MARGIN) / 2, WIDTH - MARGIN - width_of(label) / 2), at, label, align="center", name="x-label")
+    label = fit(x["label"], INNER)
+    middle = min((left + WIDTH - MARGIN) / 2, WIDTH - MARGIN - width_of(label) / 2)
+    sheet.text(middle, at, label, align="center", name="x-label")
     at -= 5
     for line in below:
         at -= 11
@@ -1002,12 +1061,14 @@ def fill_panel(panel, experiment, x_scale, y_scale, style_of):
     for row in panel.rows:
         found_x, found_y = measure(row, x), measure(row, y)
         if found_x and found_y:
-            panel.points.append(Point(found_x.value, found_y.value, x_scale.place(found_x.value), y_scale.place(found_y.value),
-                                      bar(x_scale, found_x), bar(y_scale, found_y), words(row, experiment["line"]),
-                                      style_of(row), row))
+            at = x_scale.place(found_x.value), y_scale.place(found_y.value)
+            bars = bar(x_scale, found_x), bar(y_scale, found_y)
+            line = words(row, experiment["line"])
+            panel.points.append(Point(found_x.value, found_y.value, *at, *bars, line, style_of(row), row))
     panel.floors = sorted(y_scale.place(value) for value in floors_of(panel.rows, y))
-    panel.published = [(None if px is None else x_scale.place(px), None if py is None else y_scale.place(py), by)
-                       for px, py, by in published_of(panel.rows, x, y)]
+    for px, py, by in published_of(panel.rows, x, y):
+        panel.published.append((None if px is None else x_scale.place(px),
+                                None if py is None else y_scale.place(py), by))
     if less_is_better(x) and less_is_better(y):
         front = pareto_front([(point.x, point.y) for point in panel.points])
         corners = []
@@ -1061,7 +1122,7 @@ def obstacles_in(panel, experiment, x_scale, y_scale):
 
 
 def plan_labels(layout, lines, experiment, styles, labelling, x_scale, y_scale):
-    """Finds places for the panels' labels. Returns whether all lines have theirs, and whether the front has."""
+    """Finds places for the panels' labels. Returns whether all lines have theirs, and whether the front."""
     obstacles = [obstacles_in(panel, experiment, x_scale, y_scale) for panel in layout]
     for panel, found in zip(layout, obstacles):
         if panel.floors and len(panel.points) <= CROWD:
@@ -1098,7 +1159,8 @@ def plan_labels(layout, lines, experiment, styles, labelling, x_scale, y_scale):
         spots = [(x1 + t * (x2 - x1), y1 + t * (y2 - y1), 1.0, 0.0 if y1 == y2 else 3.0)
                  for (x1, y1), (x2, y2) in zip(panel.front, panel.front[1:]) for t in (0.2, 0.5, 0.8)]
         found.soft = []
-        place = found.find(width_of("Pareto front") + 1, SMALL, spots, [(point.px, point.py) * 2 for point in panel.points], far=False)
+        strangers = [(point.px, point.py) * 2 for point in panel.points]
+        place = found.find(width_of("Pareto front") + 1, SMALL, spots, strangers, far=False)
         if place:
             panel.labels.append((place[0], "Pareto front", GREY, None, "pareto-label"))
             return labelled, True
@@ -1166,7 +1228,7 @@ def plan_gutter(panel, obstacles, lines, far, joined, styles):
     order = sorted(ends.values(), key=lambda point: (point.py, point.px))
     if len(order) * 10 > panel.height or len(panel.points) > CROWD:
         return None
-    # As near to the ends as their height allows: from below, each as low as it may be; then, from above, pushed down.
+    # As near to the ends as their height allows: from below, each as low as it may be; then pushed down.
     levels = [point.py for point in order]
     for i, level in enumerate(levels):
         levels[i] = max(level, levels[i - 1] + 10 if i else 5.0)
@@ -1184,14 +1246,15 @@ def plan_gutter(panel, obstacles, lines, far, joined, styles):
                 (point.px, point.py, *end), [label[3] for label in labels]):
             return None
         length = math.hypot(end[0] - point.px, end[1] - point.py)
-        start = (point.px + (end[0] - point.px) * radius / length, point.py + (end[1] - point.py) * radius / length)
+        start = (point.px + (end[0] - point.px) * radius / length,
+                 point.py + (end[1] - point.py) * radius / length)
         box = (x, level - SMALL / 2, x + width_of(point.line) + 1, level + SMALL / 2)
         labels.append((box, point.line, point.style.colour, (*start, *end), "label:" + point.line))
     return labels
 
 
 def flow(keys, width, joined):
-    """Keys in rows: lists of (x, kind, text, style, group). What a group begins stays in one row if it fits."""
+    """Keys in rows: lists of (x, kind, text, style, group). A group stays in one row if it fits."""
     rows, x, i = [], 0.0, 0
     while i < len(keys):
         end = i + 1
@@ -1239,7 +1302,7 @@ def draw_keys(sheet, row, y, joined):
 
 
 def draw_axes(sheet, panel, x_scale, y_scale, x_ticks, y_ticks):
-    left, bottom, right, top = panel.x, panel.y, panel.x + panel.width, panel.y + panel.height
+    left, bottom = panel.x, panel.y
     for tick, _, _ in x_ticks[0]:
         sheet.line([left + tick] * 2, [bottom + y_scale.start, bottom + y_scale.stop], FAINT, 0.5, order=1.5)
     for tick, _, _ in y_ticks[0]:
@@ -1262,9 +1325,11 @@ def draw_axes(sheet, panel, x_scale, y_scale, x_ticks, y_ticks):
                     sheet.text(left + middle, bottom - 12, word, align="center", name="tick")
             for shift in (-1.1, 1.1):  # the break: two short slanted strokes
                 if upright:
-                    sheet.line([left - 2.2, left + 2.2], [bottom + inner + shift - 0.9, bottom + inner + shift + 0.9], GREY, 0.6)
+                    at = bottom + inner + shift
+                    sheet.line([left - 2.2, left + 2.2], [at - 0.9, at + 0.9], GREY, 0.6)
                 else:
-                    sheet.line([left + inner + shift - 0.9, left + inner + shift + 0.9], [bottom - 2.2, bottom + 2.2], GREY, 0.6)
+                    at = left + inner + shift
+                    sheet.line([at - 0.9, at + 0.9], [bottom - 2.2, bottom + 2.2], GREY, 0.6)
         for low, high in parts:
             if upright:
                 sheet.line([left, left], [bottom + low, bottom + high], GREY, 0.7)
@@ -1272,9 +1337,10 @@ def draw_axes(sheet, panel, x_scale, y_scale, x_ticks, y_ticks):
                 sheet.line([left + low, left + high], [bottom, bottom], GREY, 0.7)
         strokes = [(tick, 1.8) for tick in minor] + [(tick, 3.5) for tick, _, _ in ticks]
         if upright:
-            sheet.bars([(left - length, bottom + tick, left, bottom + tick) for tick, length in strokes], GREY, None, 0.6, 2)
+            strokes = [(left - length, bottom + tick, left, bottom + tick) for tick, length in strokes]
         else:
-            sheet.bars([(left + tick, bottom - length, left + tick, bottom) for tick, length in strokes], GREY, None, 0.6, 2)
+            strokes = [(left + tick, bottom - length, left + tick, bottom) for tick, length in strokes]
+        sheet.bars(strokes, GREY, None, 0.6, 2)
         for tick, text, maths in ticks:
             if upright and panel.column == 0:
                 sheet.text(left - 5, bottom + tick - 2.9, text, align="right", name="tick", maths=maths)
@@ -1285,44 +1351,52 @@ def draw_axes(sheet, panel, x_scale, y_scale, x_ticks, y_ticks):
 def draw_panel(sheet, panel, experiment, x_scale, y_scale, x_ticks, y_ticks, titled):
     left, bottom = panel.x, panel.y
     if titled:
-        sheet.text(left, bottom + panel.height + 4, fit(panel.name or "–", panel.width, 8.5, "bold"), 8.5, INK, "bold", name="panel")
+        name = fit(panel.name or "–", panel.width, 8.5, "bold")
+        sheet.text(left, bottom + panel.height + 4, name, 8.5, INK, "bold", name="panel")
     draw_axes(sheet, panel, x_scale, y_scale, x_ticks, y_ticks)
     if panel.front:
-        sheet.line([left + x for x, _ in panel.front], [bottom + y for _, y in panel.front], FRONT, 2.2, "pareto", 2.5,
-                   solid_joinstyle="miter")
+        sheet.line([left + x for x, _ in panel.front], [bottom + y for _, y in panel.front], FRONT, 2.2,
+                   "pareto", 2.5, solid_joinstyle="miter")
     for level in panel.floors:
         sheet.line([left, left + panel.width], [bottom + level] * 2, GREY, 0.8, "floor", 3, (0, (4, 2.5)))
 
     if not panel.points:
-        sheet.text(left + panel.width / 2, bottom + panel.height / 2, "no number", colour=GREY, align="center", name="empty")
+        sheet.text(left + panel.width / 2, bottom + panel.height / 2, "no number", colour=GREY,
+                   align="center", name="empty")
     groups = {}
     for point in panel.points:
         groups.setdefault((point.line, point.style), []).append(point)
     for (line, style), points in groups.items():
-        bars = [(left + p.x_bar[0], bottom + p.py, left + p.x_bar[1], bottom + p.py) for p in points if p.x_bar]
-        bars += [(left + p.px, bottom + p.y_bar[0], left + p.px, bottom + p.y_bar[1]) for p in points if p.y_bar]
+        bars = [(p.x_bar[0], p.py, p.x_bar[1], p.py) for p in points if p.x_bar]
+        bars += [(p.px, p.y_bar[0], p.px, p.y_bar[1]) for p in points if p.y_bar]
         if bars:
+            bars = [(left + x1, bottom + y1, left + x2, bottom + y2) for x1, y1, x2, y2 in bars]
             sheet.bars(bars, style.colour, "bars:" + line, 0.9 if len(panel.points) <= 10 else 0.6)
     if experiment["join"]:
         for curve in curves_of(panel):
-            sheet.line([left + p.px for p in curve], [bottom + p.py for p in curve], curve[0].style.colour, 1.3,
-                       "line:" + curve[0].line, 5, curve[0].style.dashes)
+            style = curve[0].style
+            sheet.line([left + p.px for p in curve], [bottom + p.py for p in curve], style.colour, 1.3,
+                       "line:" + curve[0].line, 5, style.dashes)
     for (line, style), points in groups.items():
-        sheet.points([left + p.px for p in points], [bottom + p.py for p in points], style, panel.size, "point:" + line)
+        sheet.points([left + p.px for p in points], [bottom + p.py for p in points], style, panel.size,
+                     "point:" + line)
 
     for px, py, by in panel.published:
         if px is None or py is None:  # half of it is known: a line, not a made-up point
             xs = [0, panel.width] if px is None else [px, px]
             ys = [0, panel.height] if py is None else [py, py]
-            sheet.line([left + x for x in xs], [bottom + y for y in ys], GREY, 0.8, "published:" + by, 3, (0, (1.5, 1.5)))
+            sheet.line([left + x for x in xs], [bottom + y for y in ys], GREY, 0.8, "published:" + by, 3,
+                       (0, (1.5, 1.5)))
         diamond = Rectangle((-3, -3), 6, 6, fc="none", ec=GREY, lw=1.0, ls=(0, (1.6, 1.0)))
         where = (left + (px if px is not None else 0.0), bottom + (py if py is not None else 0.0))
-        diamond.set_transform(matplotlib.transforms.Affine2D().rotate_deg(45).translate(*where) + sheet.axes.transData)
+        diamond.set_transform(Affine2D().rotate_deg(45).translate(*where) + sheet.axes.transData)
         sheet.add(diamond, "published:" + by, 7)
     for box, text, colour, leader, name in panel.labels:
         if leader:
-            sheet.line([left + leader[0], left + leader[2]], [bottom + leader[1], bottom + leader[3]], colour, 0.5, "leader", 5.5)
-        sheet.text(left + box[0] + 0.5, bottom + box[1] + 0.26 * SMALL, text, SMALL, ink(colour), name=name, halo=True)
+            x1, y1, x2, y2 = leader
+            sheet.line([left + x1, left + x2], [bottom + y1, bottom + y2], colour, 0.5, "leader", 5.5)
+        x, y = left + box[0] + 0.5, bottom + box[1] + 0.26 * SMALL
+        sheet.text(x, y, text, SMALL, ink(colour), name=name, halo=True)
 
 
 # --- stability
@@ -1346,7 +1420,8 @@ def read_stability(path):
             raise Refused(f"{where}: a second row for {case}, {technique}")
         if not 0 <= failures <= of:
             raise Refused(f"{where}: {failures} failures of {of}")
-        cells[key] = Cell(failures, of, number(worst.get("value"), f"{where}.worst.value"), str(worst.get("unit") or ""),
+        cells[key] = Cell(failures, of, number(worst.get("value"), f"{where}.worst.value"),
+                          str(worst.get("unit") or ""),
                           raw.get("by_nature") is True, str(raw.get("why") or ""), raw.get("picture"))
         cases[case] = cases.get(case) or str(raw.get("what") or "")
     return {**stability, "path": path, "cells": cells, "cases": cases}
@@ -1375,13 +1450,6 @@ def worst_text(cell, unit=""):
 ALARM, NATURE = "#b8330e", "#f6e2bf"
 
 
-def parts(items, size):
-    """Shared out evenly, at most so many at a time."""
-    count = max(1, math.ceil(len(items) / size))
-    size = max(1, math.ceil(len(items) / count))
-    return [items[i:i + size] for i in range(0, len(items), size)]
-
-
 def cases_of(stability, backend, wanted=lambda cell: True):
     """The backend's cases and techniques, in the order of the file."""
     keys = [key for key, cell in stability["cells"].items() if key[0] == backend]
@@ -1390,11 +1458,12 @@ def cases_of(stability, backend, wanted=lambda cell: True):
     return cases, list(dict.fromkeys(technique for _, _, technique in keys))
 
 
-def sheet_head(stability, title, note, part, paper, height, description):
+def sheet_head(title, note, part, paper, height, description):
     """A sheet with its header and footer; returns it and where the next line may stand."""
     sheet = Sheet(height, title, description, paper)
     at = sheet.height - 22
-    sheet.text(MARGIN, at, fit(title + (f" ({part})" if part else ""), WIDTH - 2 * MARGIN, 11, "bold"), 11, INK, "bold", name="title")
+    title = fit(title + (f" ({part})" if part else ""), INNER, 11, "bold")
+    sheet.text(MARGIN, at, title, 11, INK, "bold", name="title")
     for line in note:
         at -= 11.5
         sheet.text(MARGIN, at, line, SMALL, GREY, name="note")
@@ -1406,87 +1475,105 @@ def draw_footer(sheet, lines):
         sheet.text(MARGIN, 10 + 11 * i, line, SMALL, GREY, name="footer")
 
 
-def paged(cases, height_of, room):
-    """Cases in pages, none of which is higher than the room (unless a case alone is)."""
-    pages, height = [[]], 0.0
+def paged(cases, height_of):
+    """Cases in pages, none of which is too tall (unless a case alone is); height_of takes a page's cases."""
+    pages = [[]]
     for case in cases:
-        if pages[-1] and height + height_of(case) > room:
+        if pages[-1] and height_of(pages[-1] + [case]) > TALLEST:
             pages.append([])
-            height = 0.0
         pages[-1].append(case)
-        height += height_of(case)
-    if len(pages) > 1:  # the same number of cases on each, if that fits
-        even = parts(cases, math.ceil(len(cases) / len(pages)))
-        if all(sum(map(height_of, page)) <= room for page in even):
-            return even
-    return pages
+    even = parts(cases, math.ceil(len(cases) / len(pages)))
+    return even if all(height_of(page) <= TALLEST for page in even) else pages
+
+
+class StabilityTable:
+    """Some techniques' columns of the table, and how high its rows are."""
+
+    def __init__(self, stability, backend, techniques):
+        self.stability, self.backend, self.techniques = stability, backend, techniques
+        units = {cell.unit for key, cell in stability["cells"].items()
+                 if key[0] == backend and cell.worst is not None}
+        self.unit = units.pop() if len(units) == 1 else ""  # which all have, so that no cell need say it
+        self.step = {4: 92.0, 5: 77.0}.get(len(techniques), 105.0)
+        self.first = INNER - self.step * len(techniques)
+        self.footer = footer_of(stability, [], [backend])
+        self.note = wrap(
+            f"Failures, and below them the worst error{', ' * bool(self.unit)}{self.unit}. Tinted: the "
+            "technique fails this case by its nature. Red: it should not fail.", INNER, 2)
+
+    def cells(self, case):
+        return [self.stability["cells"].get((self.backend, case, technique)) for technique in self.techniques]
+
+    def names(self, case):
+        return wrap(case, self.first - 10, 2, 8.5, "bold")
+
+    def what(self, case):
+        return wrap(self.stability["cases"][case], self.first - 10, 4)
+
+    def row_height(self, case):
+        lines = [
+            len(wrap(worst_text(cell, self.unit), self.step - 18, 2)) for cell in self.cells(case) if cell
+        ]
+        return 15 + 10 * max([len(self.names(case)) - 1 + len(self.what(case)), 1] + lines)
+
+    def whys(self, cases):
+        """The reasons for what fails by nature, each once, as lines."""
+        found = dict.fromkeys(cell.why for case in cases for cell in self.cells(case)
+                              if cell and cell.by_nature and cell.failures and cell.why)
+        return {why: wrap(why, INNER - 14, 2) for why in found}
+
+    def height(self, cases):
+        whys = sum(len(lines) for lines in self.whys(cases).values())
+        return (22 + 11.5 * len(self.note) + 25 + sum(map(self.row_height, cases)) + 12 + 11 * whys +
+                11 * len(self.footer) + 10)
+
+    def draw(self, cases, part, paper):
+        whys = self.whys(cases)
+        letters = {why: letter_of(k) for k, why in enumerate(whys)}
+        failed = sum(
+            1 for case in cases for cell in self.cells(case) if cell and cell.failures and not cell.by_nature)
+        description = (
+            f"{len(cases)} cases, {len(self.techniques)} techniques; {failed} of the cells are failures that "
+            f"are not by nature. {' '.join(self.footer)}")
+        sheet, at = sheet_head(f"Stability · {machine(self.backend)}", self.note, part, paper,
+                               self.height(cases), description)
+        at -= 20
+        columns = [MARGIN + self.first + k * self.step for k in range(len(self.techniques))]
+        for x, technique in zip(columns, self.techniques):
+            name = fit(technique, self.step - 8, SMALL, "bold")
+            sheet.text(x + 5, at, name, SMALL, INK, "bold", name="technique")
+        at -= 5
+        sheet.line([MARGIN, WIDTH - MARGIN], [at, at], INK, 0.8)
+        for case in cases:
+            names, height = self.names(case), self.row_height(case)
+            for k, line in enumerate(names):
+                sheet.text(MARGIN, at - 11 - 10 * k, line, 8.5, INK, "bold", name="case")
+            for k, line in enumerate(self.what(case)):
+                sheet.text(MARGIN, at - 11 - 10 * (k + len(names)), line, SMALL, GREY, name="what")
+            at -= height
+            for x, technique, cell in zip(columns, self.techniques, self.cells(case)):
+                draw_cell(sheet, cell, x, at, self.step, height, letters, technique, self.unit)
+            sheet.line([MARGIN, WIDTH - MARGIN], [at, at], FAINT, 0.6)
+        at -= 6
+        for why, lines in whys.items():
+            sheet.text(MARGIN, at - 11, letters[why], SMALL, INK, "bold", name="why")
+            for line in lines:
+                at -= 11
+                sheet.text(MARGIN + 14, at, line, SMALL, INK, name="why")
+        draw_footer(sheet, self.footer)
+        return sheet
 
 
 def draw_stability(stability, backend, paper=False):
-    """The table of failures on a backend: cases down, techniques across; as sheets."""
+    """The table of failures on a backend: cases down, techniques across; as (name, sheet)."""
     cases, techniques = cases_of(stability, backend)
-    footer = footer_of(stability, [], [backend])
-    units = {cell.unit for key, cell in stability["cells"].items() if key[0] == backend and cell.worst is not None}
-    unit = units.pop() if len(units) == 1 else ""
-    note = wrap(f"Failures, and below them the worst error{', ' + unit if unit else ''}. Tinted: the technique fails this case "
-                "by its nature. Red: it should not fail.", WIDTH - 2 * MARGIN, 2)
-    blocks = parts(techniques, 5 if len(techniques) == 5 else 4)
-    step = {4: 92.0, 5: 77.0}.get(len(blocks[0]), 105.0)
-    first = WIDTH - 2 * MARGIN - step * len(blocks[0])
-
-    def row_height(case):
-        cells = [stability["cells"].get((backend, case, technique)) for technique in techniques]
-        names = len(wrap(case, first - 10, 2, 8.5, "bold")) - 1
-        return 15 + 10 * max([names + len(wrap(stability["cases"][case], first - 10, 4)), 1] +
-                             [len(wrap(worst_text(cell, unit), step - 18, 2)) for cell in cells if cell])
-
-    layouts = []
-    for block in blocks:
-        # Reasons are printed below the table, each once, lettered; pages leave room for them.
-        reasons = list(dict.fromkeys(cell.why for case in cases for technique in block
-                                     for cell in [stability["cells"].get((backend, case, technique))]
-                                     if cell and cell.by_nature and cell.failures and cell.why))
-        room = TALLEST - 110 - 11 * min(12, sum(len(wrap(why, WIDTH - 2 * MARGIN - 14, 2)) for why in reasons))
-        layouts += [(block, reasons, page) for page in paged(cases, row_height, room)]
-    sheets = []
-    for i, (block, reasons, page) in enumerate(layouts):
-        part = f"{i + 1} of {len(layouts)}" if len(layouts) > 1 else ""
-        cells = {(case, technique): stability["cells"].get((backend, case, technique)) for case in page for technique in block}
-        used = list(dict.fromkeys(cell.why for cell in cells.values() if cell and cell.by_nature and cell.failures and cell.why))
-        letters = {why: letter_of(k) for k, why in enumerate(used)}
-        whys = [(letters[why], wrap(why, WIDTH - 2 * MARGIN - 14, 2)) for why in used][:12]
-        body = sum(map(row_height, page))
-        height = 22 + 11.5 * len(note) + 24 + body + 8 + 11 * sum(len(lines) for _, lines in whys) + (6 if whys else 0) + 11 * len(footer) + 10
-        title = "Stability · " + {"cpu": "CPU", "cuda": "CUDA"}.get(backend, backend)
-        failed = sum(1 for cell in cells.values() if cell and cell.failures and not cell.by_nature)
-        description = f"{len(page)} cases, {len(block)} techniques; {failed} failures that are not by nature. {' '.join(footer)}"
-        sheet, at = sheet_head(stability, title, note, part, paper, height, description)
-        at -= 20
-        for k, technique in enumerate(block):
-            sheet.text(MARGIN + first + k * step + 5, at, fit(technique, step - 8, SMALL, "bold"), SMALL, INK, "bold", name="technique")
-        at -= 5
-        sheet.line([MARGIN, WIDTH - MARGIN], [at, at], INK, 0.8)
-        for case in page:
-            high = row_height(case)
-            names = wrap(case, first - 10, 2, 8.5, "bold")
-            for k, line in enumerate(names):
-                sheet.text(MARGIN, at - 11 - 10 * k, line, 8.5, INK, "bold", name="case")
-            for k, line in enumerate(wrap(stability["cases"][case], first - 10, 4)):
-                sheet.text(MARGIN, at - 11 - 10 * (k + len(names)), line, SMALL, GREY, name="what")
-            for k, technique in enumerate(block):
-                draw_cell(sheet, cells[case, technique], MARGIN + first + k * step, at - high, step, high, letters, technique, unit)
-            at -= high
-            sheet.line([MARGIN, WIDTH - MARGIN], [at, at], FAINT, 0.6)
-        at -= 6
-        for letter, lines in whys:
-            for k, line in enumerate(lines):
-                at -= 11
-                if k == 0:
-                    sheet.text(MARGIN, at, letter, SMALL, INK, "bold", name="why")
-                sheet.text(MARGIN + 14, at, line, SMALL, INK, name="why")
-        draw_footer(sheet, footer)
-        sheets.append((f"stability_{backend}" + (f"_{i + 1}" if part else ""), sheet))
-    return sheets
+    tables = [
+        StabilityTable(stability, backend, block)
+        for block in parts(techniques, 5 if len(techniques) == 5 else 4)
+    ]
+    pages = [(table, page) for table in tables for page in paged(cases, table.height)]
+    return [(name, table.draw(page, part, paper))
+            for (table, page), (name, part) in zip(pages, numbered(f"stability_{backend}", len(pages)))]
 
 
 def letter_of(i):
@@ -1528,66 +1615,94 @@ def load_picture(directory, path):
         return "picture not here", f"{path}: {getattr(error, 'strerror', None) or error}".splitlines()[0]
 
 
-def draw_failures(stability, backend, paper=False):
-    """The contact sheets: for each case with failures its pictures side by side, enlarged by whole factors."""
-    directory = os.path.dirname(stability["path"])
-    cases, techniques = cases_of(stability, backend, lambda cell: cell.failures > 0)
-    if not cases:
-        return []
-    footer = footer_of(stability, [], [backend])
-    across = min(4, max(1, len(techniques)))
-    place = 256 * PIXEL
-    step = place + 4
-    first = WIDTH - 2 * MARGIN - 4 * step
-    techniques_of = {case: [t for t in techniques if (backend, case, t) in stability["cells"]] for case in cases}
-    pictures = {(case, t): load_picture(directory, stability["cells"][backend, case, t].picture)
-                for case in cases for t in techniques_of[case]}
-    lacking = [picture[1] for picture in pictures.values() if isinstance(picture, tuple) and picture[1]]
-    if lacking:
-        print(f"warning: {len(lacking)} picture{'s are' if len(lacking) > 1 else ' is'} missing: {lacking[0]}"
-              f"{' …' if len(lacking) > 1 else ''}", file=sys.stderr)
-    if all(isinstance(picture, tuple) for picture in pictures.values()):
-        return []
-    sides = {case: max([size_of(pictures[case, t])[1] for t in techniques_of[case]]) or 60.0 for case in cases}
-    row_height = lambda case: max(math.ceil(len(techniques_of[case]) / across) * (sides[case] + 27) + 8,
-                                  22 + 11 * len(wrap(case, first - 6, 2, 8.5, "bold")) +
-                                  10 * len(wrap(stability["cases"][case], first - 6, 7)))
-    pages = paged(cases, row_height, TALLEST - 70)
-    sheets = []
-    for i, page in enumerate(pages):
-        part = f"{i + 1} of {len(pages)}" if len(pages) > 1 else ""
-        title = "What failures look like · " + {"cpu": "CPU", "cuda": "CUDA"}.get(backend, backend)
-        note = wrap("The cases in which a technique fails, pixel by pixel. Red: not by its nature.", WIDTH - 2 * MARGIN, 1)
-        height = 22 + 11.5 * len(note) + 14 + sum(map(row_height, page)) + 11 * len(footer) + 10
-        sheet, at = sheet_head(stability, title, note, part, paper, height, f"{len(page)} cases. {' '.join(footer)}")
+class ContactSheet:
+    """The pictures of the cases that a technique fails, side by side, and how high its rows are."""
+
+    def __init__(self, stability, backend):
+        self.stability, self.backend = stability, backend
+        self.cases, techniques = cases_of(stability, backend, lambda cell: cell.failures > 0)
+        self.techniques = {
+            case: [technique for technique in techniques if (backend, case, technique) in stability["cells"]
+                  ] for case in self.cases
+        }
+        directory = os.path.dirname(stability["path"])
+        self.pictures = {(case, technique): load_picture(directory, stability["cells"][backend, case,
+                                                                                       technique].picture)
+                         for case in self.cases for technique in self.techniques[case]}
+        self.across = min(4, max(1, len(techniques)))
+        self.place = 256 * PIXEL
+        self.step = self.place + 4
+        self.first = INNER - 4 * self.step
+        self.footer = footer_of(stability, [], [backend])
+
+    def names(self, case):
+        return wrap(case, self.first - 6, 2, 8.5, "bold")
+
+    def what(self, case):
+        return wrap(self.stability["cases"][case], self.first - 6, 7)
+
+    def picture_height(self, case):
+        return max(size_of(self.pictures[case, technique])[1] for technique in self.techniques[case]) or 60.0
+
+    def row_height(self, case):
+        rows = math.ceil(len(self.techniques[case]) / self.across)
+        return max(rows * (self.picture_height(case) + 27) + 8,
+                   22 + 11 * len(self.names(case)) + 10 * len(self.what(case)))
+
+    def height(self, cases):
+        return 22 + 11.5 + 14 + sum(map(self.row_height, cases)) + 11 * len(self.footer) + 10
+
+    def draw(self, cases, part, paper):
+        note = ["The cases in which a technique fails, pixel by pixel. Red: not by its nature."]
+        sheet, at = sheet_head(f"What failures look like · {machine(self.backend)}", note, part, paper,
+                               self.height(cases), f"{len(cases)} cases. {' '.join(self.footer)}")
         at -= 10
-        for case in page:
+        for case in cases:
             sheet.line([MARGIN, WIDTH - MARGIN], [at, at], FAINT, 0.6)
             below = at - 14
-            for line in wrap(case, first - 6, 2, 8.5, "bold"):
+            for line in self.names(case):
                 sheet.text(MARGIN, below, line, 8.5, INK, "bold", name="case")
                 below -= 11
-            for line in wrap(stability["cases"][case], first - 6, 7):
+            for line in self.what(case):
                 sheet.text(MARGIN, below, line, SMALL, GREY, name="what")
                 below -= 10
-            for k, technique in enumerate(techniques_of[case]):
-                cell = stability["cells"][backend, case, technique]
+            height = self.picture_height(case)
+            for k, technique in enumerate(self.techniques[case]):
                 # On whole pixels, or else the print would blur the picture's own.
-                x = math.ceil((MARGIN + first + k % across * step) / PIXEL) * PIXEL
-                y = math.floor((at - 5 - k // across * (sides[case] + 27) - sides[case]) / PIXEL) * PIXEL
-                draw_picture(sheet, pictures[case, technique], x, y, sides[case], cell, technique)
-                loud = cell.failures > 0 and not cell.by_nature
-                sheet.text(x, y - 9.5, fit(technique, place, SMALL, "bold"), SMALL, INK, "bold", name="technique")
-                sheet.text(x, y - 19.5, fit(("✗ " if loud else "") + rate_text(cell), place), SMALL,
-                           ALARM if loud else INK if cell.failures else GREY, "bold" if loud else "normal", name="rate")
-            at -= row_height(case)
-        draw_footer(sheet, footer)
-        sheets.append((f"failures_{backend}" + (f"_{i + 1}" if part else ""), sheet))
-    return sheets
+                x = math.ceil((MARGIN + self.first + k % self.across * self.step) / PIXEL) * PIXEL
+                y = math.floor((at - 5 - k // self.across * (height + 27) - height) / PIXEL) * PIXEL
+                self.draw_picture(sheet, case, technique, x, y, height)
+            at -= self.row_height(case)
+        draw_footer(sheet, self.footer)
+        return sheet
+
+    def draw_picture(self, sheet, case, technique, x, y, room):
+        """A picture, or a word in its place, at the top of a room so high; below it, whose, and the rate."""
+        cell, pixels = self.stability["cells"][self.backend, case, technique], self.pictures[case, technique]
+        loud = cell.failures > 0 and not cell.by_nature
+        sheet.text(x, y - 9.5, fit(technique, self.place, SMALL, "bold"), SMALL, INK, "bold",
+                   name="technique")
+        colour, weight = (ALARM, "bold") if loud else (INK if cell.failures else GREY, "normal")
+        rate = fit(("✗ " if loud else "") + rate_text(cell), self.place, SMALL, weight)
+        sheet.text(x, y - 19.5, rate, SMALL, colour, weight, name="rate")
+        if isinstance(pixels, tuple):
+            sheet.box(x, y, self.place, room, BAND, "placeholder", 1.2)
+            sheet.text(x + self.place / 2, y + room / 2 - 3, pixels[0], SMALL, GREY, align="center",
+                       name="placeholder")
+            return
+        width, height = size_of(pixels)
+        factor = 256 // max(pixels.shape[:2])
+        if factor:
+            pixels = np.repeat(np.repeat(pixels, factor, 0), factor, 1)
+        if pixels.ndim == 2:
+            pixels = np.repeat(pixels[:, :, None], 3, 2)
+        sheet.picture(x, y + room - height, width, height, pixels, f"picture:{technique}")
+        if loud:
+            sheet.box(x, y + room - height, width, height, "none", f"alarm:{technique}", 4, ALARM, 1.6)
 
 
 def size_of(pixels):
-    """A picture's width and height on paper: enlarged by a whole factor, the longer side at most 256 pixels."""
+    """A picture's width and height on paper: enlarged by a whole factor, to at most 256 pixels."""
     if isinstance(pixels, tuple):
         return 0.0, 0.0
     height, width = pixels.shape[:2]
@@ -1595,21 +1710,19 @@ def size_of(pixels):
     return width * unit, height * unit
 
 
-def draw_picture(sheet, pixels, x, y, room, cell, technique):
-    """A picture, or a word in its place, at the top of a room so high."""
-    if isinstance(pixels, tuple):
-        sheet.box(x, y, 256 * PIXEL, room, BAND, "placeholder", 1.2)
-        sheet.text(x + 128 * PIXEL, y + room / 2 - 3, pixels[0], SMALL, GREY, align="center", name="placeholder")
-        return
-    width, height = size_of(pixels)
-    factor = 256 // max(pixels.shape[:2])
-    if factor:
-        pixels = np.repeat(np.repeat(pixels, factor, 0), factor, 1)
-    if pixels.ndim == 2:
-        pixels = np.repeat(pixels[:, :, None], 3, 2)
-    sheet.picture(x, y + room - height, width, height, pixels, f"picture:{technique}")
-    if cell.failures > 0 and not cell.by_nature:
-        sheet.box(x, y + room - height, width, height, "none", f"alarm:{technique}", 4, ALARM, 1.6)
+def draw_failures(stability, backend, paper=False):
+    """The contact sheets of a backend's failures, as (name, sheet); none where there is no picture."""
+    contact = ContactSheet(stability, backend)
+    absent = [picture for picture in contact.pictures.values() if isinstance(picture, tuple)]
+    wrong = [reason for _, reason in absent if reason]
+    if wrong:
+        print(f"warning: {len(wrong)} picture{'s are' if len(wrong) > 1 else ' is'} missing: {wrong[0]}"
+              f"{' …' if len(wrong) > 1 else ''}", file=sys.stderr)
+    if len(absent) == len(contact.pictures):
+        return []
+    pages = paged(contact.cases, contact.height)
+    return [(name, contact.draw(page, part, paper))
+            for page, (name, part) in zip(pages, numbered(f"failures_{backend}", len(pages)))]
 
 
 # --- tables
@@ -1629,16 +1742,17 @@ def table(names, lines, right):
 
 
 def spread(value, low, high):
-    ends = [rounded(end) for end in (low, high) if end is not None]
-    return rounded(value) + (f" [{'–'.join(ends)}]" if value is not None and len(ends) == 2 and low != high else "")
+    if None in (value, low, high) or low == high:
+        return rounded(value)
+    return f"{rounded(value)} [{rounded(low)}–{rounded(high)}]"
 
 
 def experiment_table(report, plots):
     """The rows that some plots share, all of them."""
     rows = [row for row in report["rows"] if row["experiment"] == plots[0]["rows_of"]]
     # As columns: the fields that the plots name, then what else differs.
-    fields = list(dict.fromkeys([field for plot in plots for field in plot["figure"] + plot["panel"]] + ["technique"] +
-                                [field for plot in plots for field in plot["line"] + plot["mark"]]))
+    fields = [field for plot in plots for field in plot["figure"] + plot["panel"]] + ["technique"]
+    fields = list(dict.fromkeys(fields + [field for plot in plots for field in plot["line"] + plot["mark"]]))
     names = dict.fromkeys(name for row in rows for name in row["settings"])
     for field in ["scene", "backend"] + [f"settings.{name}" for name in names]:
         if field not in fields and len({words_of(row, field) for row in rows}) > 1:
@@ -1646,15 +1760,16 @@ def experiment_table(report, plots):
     kinds = list(dict.fromkeys(error["kind"] for row in rows for error in row["errors"]))
     built = any(row["build_ms"] is not None for row in rows)
     theirs = any(row["published"] for row in rows)
-    numbers = ["time, ms [q1–q3]"] + (["build, ms"] if built else []) + [kind.replace("_", " ") for kind in kinds] + ["bytes"]
+    numbers = ["time, ms [q1–q3]"] + (["build, ms"] if built else [])
+    numbers += [kind.replace("_", " ") for kind in kinds] + ["bytes"]
     heads = [field.replace("settings.", "") for field in fields] + numbers + (["published"] if theirs else [])
     lines = []
     for row in rows:
         cells = []
         for field in fields:
             value = row["settings"].get(field[9:]) if field.startswith("settings.") else None
-            bare = plain(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else words_of(row, field)
-            cells.append(escaped(bare))
+            bare = isinstance(value, (int, float)) and not isinstance(value, bool)  # the column names it
+            cells.append(escaped(plain(value) if bare else words_of(row, field)))
         time = row["time_ms"]
         cells.append(spread(time["median"], time["q1"], time["q3"]) if time else "–")
         if built:
@@ -1664,15 +1779,17 @@ def experiment_table(report, plots):
             cells.append(spread(error["value"], error["low"], error["high"]) if error else "–")
         cells.append(rounded(row["bytes"]))
         if theirs:
-            one = row["published"]
-            cells.append("–" if not one else escaped(", ".join(
-                ([f"{rounded(one['time_ms'])} ms"] if one["time_ms"] is not None else []) +
-                [f"{error['kind']} {rounded(error['value'])}" for error in one["errors"]] +
-                [" on ".join(filter(None, (one["by"], one["hardware"])))])))
+            cells.append(escaped(published_text(row["published"])) if row["published"] else "–")
         lines.append(cells)
     heads_of = [f"*{escaped(plot['title'])}.* {escaped(plot['note'])}".rstrip() for plot in plots]
     head = f"## {escaped(plots[0]['rows_of'])}\n\n" + "\n\n".join(heads_of) + "\n\n"
     return head + (table(heads, lines, set(numbers)) if rows else "No rows.\n")
+
+
+def published_text(one):
+    facts = [f"{rounded(one['time_ms'])} ms"] if one["time_ms"] is not None else []
+    facts += [f"{error['kind']} {rounded(error['value'])}" for error in one["errors"]]
+    return ", ".join(facts + [" on ".join(filter(None, (one["by"], one["hardware"])))])
 
 
 def stability_table(stability):
@@ -1681,7 +1798,7 @@ def stability_table(stability):
         cases, techniques = cases_of(stability, backend)
         lines, whys = [], {}
         for case in cases:
-            cells = [escaped(case) + (": " + escaped(stability["cases"][case]) if stability["cases"][case] else "")]
+            cells = [escaped(": ".join(filter(None, (case, stability["cases"][case]))))]
             for technique in techniques:
                 cell = stability["cells"].get((backend, case, technique))
                 if cell is None:
@@ -1693,8 +1810,8 @@ def stability_table(stability):
                     text += f" (by nature{', ' + letter if letter else ''})"
                 cells.append(f"**{text}**" if cell.failures and not cell.by_nature else text)
             lines.append(cells)
-        out.append(f"On the {({'cpu': 'CPU', 'cuda': 'GPU'}).get(backend, escaped(backend))}: failures; the worst error. "
-                   "Bold: not by the technique's nature.\n")
+        out.append(
+            f"{escaped(machine(backend))}: failures; the worst error. Bold: not by the technique's nature.\n")
         out.append(table(["case"] + techniques, lines, set()))
         if whys:
             out.append("\n".join(f"- {letter}: {escaped(why)}" for why, letter in whys.items()) + "\n")
@@ -1739,10 +1856,12 @@ def draw_all(directory, paper):
         for experiment in report["experiments"]:
             sheets = draw_experiment(report, experiment, styles, paper)
             if not sheets:
-                print(f"warning: {paths[0]}: {experiment['name']} has no rows and is not drawn", file=sys.stderr)
+                print(f"warning: {paths[0]}: {experiment['name']} has no rows and is not drawn",
+                      file=sys.stderr)
             keep(sheets)
         for name in dict.fromkeys(experiment["rows_of"] for experiment in report["experiments"]):
-            tables.append(experiment_table(report, [one for one in report["experiments"] if one["rows_of"] == name]))
+            tables.append(
+                experiment_table(report, [one for one in report["experiments"] if one["rows_of"] == name]))
         if report["left_out"]:
             tables.append("## Left out\n\n" + "".join(f"- {escaped(what)}\n" for what in report["left_out"]))
     if stability:
@@ -1778,7 +1897,8 @@ def main(arguments=None):
                     "DIR/stability.json as SVG and PNG, and writes all numbers to tables.md.")
     parser.add_argument("directory", metavar="DIR", help="the folder of the report")
     parser.add_argument("--out", metavar="DIR", help="where the files go; the report's folder if not given")
-    parser.add_argument("--print", dest="paper", action="store_true", help="for paper: a white page instead of a card")
+    parser.add_argument("--print", dest="paper", action="store_true",
+                        help="for paper: a white page instead of a card")
     options = parser.parse_args(arguments)
     directory = options.directory.rstrip("/") or "/"
     out = options.out or directory

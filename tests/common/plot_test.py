@@ -38,41 +38,56 @@ def row(x=1.0, y=1.0, technique="plane", scene="bunny", backend="cpu", settings=
     time = {"median": x, "q1": x * 0.9, "q3": x * 1.2, "repeats": 5} if isinstance(x, float) else \
         {"median": x, "q1": x, "q3": x, "repeats": 5}
     error = {"kind": "rmse", "value": y, "low": None, "high": None}
-    return {"experiment": experiment, "scene": scene, "backend": backend, "technique": technique,
-            "settings": settings or {}, "time_ms": time, "error": error, "errors": [error], "build_ms": 2.0, "rays": 1e6,
-            "mrays_per_s": 1.0, "node_visits": 0, "primitive_tests": 1e6, "bytes": 1000, **more}
+    return {
+        "experiment": experiment, "scene": scene, "backend": backend, "technique": technique,
+        "settings": settings or {}, "time_ms": time, "error": error, "errors": [error], "build_ms": 2.0,
+        "rays": 1e6, "mrays_per_s": 1.0, "node_visits": 0, "primitive_tests": 1e6, "bytes": 1000, **more
+    }
 
 
 def experiment(name="e", x="time_ms", y="error", **more):
     x, y = ({"quantity": axis, "label": f"the {axis}"} if isinstance(axis, str) else axis for axis in (x, y))
-    return {"name": name, "title": f"About {name}", "note": "A note.", "x": x, "y": y, "figure": ["backend"], "panel": ["scene"], "line": ["technique"],
-            "mark": [], "join": False, **more}
+    return {
+        "name": name, "title": f"About {name}", "note": "A note.", "x": x, "y": y, "figure": ["backend"],
+        "panel": ["scene"], "line": ["technique"], "mark": [], "join": False, **more
+    }
 
 
 def report(rows, experiments=None):
-    return {"chapter": "01_ray_casting", "title": "Ray casting", "revision": "57a71c8",
-            "device": {"cpu": "A processor with a long name, 2 threads", "gpu": "NVIDIA H100 80GB HBM3"}, "seed": 0,
-            "experiments": [experiment()] if experiments is None else experiments, "rows": rows}
+    return {
+        "chapter": "01_ray_casting", "title": "Ray casting", "revision": "57a71c8",
+        "device": {"cpu": "A processor with a long name, 2 threads", "gpu": "NVIDIA H100 80GB HBM3"},
+        "seed": 0, "experiments": [experiment()] if experiments is None else experiments, "rows": rows
+    }
 
 
 TESTS = ["plane", "moller-trumbore", "baldwin-weber", "watertight"]
 
 
 def chapter_one(seed):
-    """A report like chapter 01's: sets × tests × float or double × loops, times over triangles, errors over time."""
+    """Like chapter 01's report: sets × tests × float or double × loops; times over triangles; errors over time."""
     draw = random.Random(seed)
     rows = []
-    for scene, test, scalar, loop in itertools.product(["random", "slivers 1e7", "grazing", "far 1e5", "size 1e-18", "edges", "a", "b",
-                                                        "c", "d", "e", "f"], TESTS, ["float", "double"], ["plain", "blocked"]):
-        error = draw.choice([0, INF, 3.0, 10 ** draw.uniform(-9, 6)] if scene in ("edges", "size 1e-18") else [3.0, 10 ** draw.uniform(-9, 6)])
-        rows.append(row(10 ** draw.uniform(0, 1.5), error, test, scene, settings={"scalar": scalar, "loop": loop}, experiment="tests"))
+    sets = ["random", "slivers 1e7", "grazing", "far 1e5", "size 1e-18", "edges", *"abcdef"]
+    for scene, test, scalar, loop in itertools.product(sets, TESTS, ["float", "double"], ["plain", "blocked"]):
+        odd = [0, INF] if scene in ("edges", "size 1e-18") else []
+        error = draw.choice(odd + [3.0, 10 ** draw.uniform(-9, 6)])
+        rows.append(
+            row(10 ** draw.uniform(0, 1.5), error, test, scene, settings={"scalar": scalar, "loop": loop},
+                experiment="tests"))
     for backend, test, k in itertools.product(["cpu", "cuda"], TESTS, range(7)):
-        rows.append(row(10 ** (0.5 * k + draw.uniform(0, 0.4)), 0, test, "random", backend, {"triangles": int(10 ** (2 + k / 2))}, "triangles"))
+        rows.append(
+            row(10 ** (0.5 * k + draw.uniform(0, 0.4)), 0, test, "random", backend,
+                {"triangles": int(10 ** (2 + k / 2))}, "triangles"))
     for scene, test, k in itertools.product(["bunny", "teaset"], TESTS, range(8)):
-        one = row(300.0 * 2 ** k * draw.uniform(0.95, 1.3), 0.1 * 2 ** (-k / 2) * draw.uniform(0.97, 1.03), test, scene, experiment="samples")
+        one = row(300.0 * 2 ** k * draw.uniform(0.95, 1.3), 0.1 * 2 ** (-k / 2) * draw.uniform(0.97, 1.03),
+                  test, scene, experiment="samples")
         one["errors"] = [one["error"], {"kind": "rmse_floor", "value": 0.004}]
         if (test, k) == ("plane", 0):
-            one["published"] = {"time_ms": 900.0, "error": 0.02 if scene == "bunny" else None, "by": "Somebody 2010", "hardware": "a GTX 280"}
+            one["published"] = {
+                "time_ms": 900.0, "error": 0.02 if scene == "bunny" else None, "by": "Somebody 2010",
+                "hardware": "a GTX 280"
+            }
         rows.append(one)
     return report(rows, [
         experiment("tests", "ns_per_test", "error.rmse", mark=["settings.scalar", "settings.loop"]),
@@ -84,10 +99,17 @@ def stability(cases=25, techniques=TESTS, seed=1):
     draw, rows = random.Random(seed), []
     for i, technique in itertools.product(range(cases), techniques):
         failures = draw.choice([0, 0, 0, 0, 7, 4096])
-        rows.append({"case": f"case {i}", "what": "a case of a kind " * (i % 4), "technique": technique, "backend": "cpu",
-                     "failures": failures, "of": 4096, "worst": {"value": draw.choice([0.3, INF, None, 1e7]), "unit": "of its bound"},
-                     "by_nature": failures > 0 and i % 5 > 0, "why": f"because of reason {i % 3}"})
-    return {"chapter": "01_ray_casting", "revision": "57a71c8", "device": {"cpu": "A processor", "gpu": None}, "rows": rows}
+        name = f"case {i}" + " and a name that takes two lines" * (i % 4 == 3)
+        rows.append({
+            "case": name, "what": "a case of a kind " * (i % 4), "technique": technique,
+            "backend": "cpu", "failures": failures, "of": 4096,
+            "worst": {"value": draw.choice([0.3, INF, None, 1e7]), "unit": "of its bound"},
+            "by_nature": failures > 0 and i % 5 > 0, "why": f"because of reason {i % 3}"
+        })
+    return {
+        "chapter": "01_ray_casting", "revision": "57a71c8", "device": {"cpu": "A processor", "gpu": None},
+        "rows": rows
+    }
 
 
 class Folder(tempfile.TemporaryDirectory):
@@ -130,11 +152,15 @@ def chapter_one_sheets(seed):
 
 def drawn(sheet, start="point:"):
     """The centres of the markers that are on the sheet, in points."""
-    return [(x, y) for artist in artists(sheet, start) for x, y in zip(artist.get_xdata(), artist.get_ydata())]
+    return [(x, y) for artist in artists(sheet, start)
+            for x, y in zip(artist.get_xdata(), artist.get_ydata())]
 
 
 def texts(sheet):
-    return [artist for artist in sheet.axes.get_children() if isinstance(artist, matplotlib.text.Text) and artist.get_text()]
+    return [
+        artist for artist in sheet.axes.get_children()
+        if isinstance(artist, matplotlib.text.Text) and artist.get_text()
+    ]
 
 
 def box_of(sheet, text):
@@ -184,7 +210,8 @@ class Rails(unittest.TestCase):
         self.assertEqual(artists(sheet, "rail"), [])
         panel = sheet.panels[0]
         low, high = panel.points[0].x_bar
-        self.assertAlmostEqual((high - low) / (panel.points[1].px - panel.points[0].px), math.log10(1.2 / 0.9), places=9)
+        self.assertAlmostEqual((high - low) / (panel.points[1].px - panel.points[0].px),
+                               math.log10(1.2 / 0.9), places=9)
         self.assertAlmostEqual(panel.points[0].y_bar[0], 0.0)
         (bars,) = artists(sheet, "bars:plane")
         xs = [x - panel.x for x in bars.get_xdata() if not math.isnan(x)]
@@ -193,7 +220,12 @@ class Rails(unittest.TestCase):
 
     # Catches: a NaN or a missing number that vanishes without a word.
     def test_rows_without_a_number_are_named(self):
-        rows = [row(1.0, 1.0), row(2.0, NAN, "watertight"), row(2.0, None, "baldwin-weber"), row(2.0, 2.0, time_ms=None)]
+        rows = [
+            row(1.0, 1.0),
+            row(2.0, NAN, "watertight"),
+            row(2.0, None, "baldwin-weber"),
+            row(2.0, 2.0, time_ms=None)
+        ]
         sheet = only_sheet(rows)
         self.assertEqual(len(drawn(sheet)), 1)
         self.assertEqual(len(sheet.missing), 3)
@@ -211,7 +243,8 @@ class Front(unittest.TestCase):
     def test_against_brute_force(self):
         draw = random.Random(5)
         for _ in range(400):
-            values = [0.0, 1.0, 2.0, 3.0, math.inf] if draw.random() < 0.5 else [draw.random() for _ in range(9)]
+            ties = draw.random() < 0.5
+            values = [0.0, 1.0, 2.0, 3.0, math.inf] if ties else [draw.random() for _ in range(9)]
             points = [(draw.choice(values), draw.choice(values)) for _ in range(draw.randrange(0, 14))]
             best = [i for i, (x, y) in enumerate(points) if math.isfinite(x) and math.isfinite(y) and
                     not any(a <= x and b <= y and (a, b) != (x, y) for a, b in points)]
@@ -220,7 +253,10 @@ class Front(unittest.TestCase):
     # Catches: a staircase that misses its points, runs above one of them, or stands where less is not better.
     def test_where_it_is_drawn(self):
         draw = random.Random(6)
-        rows = [row(draw.uniform(1, 100), draw.choice([0, draw.uniform(1, 100)]), draw.choice(TESTS)) for _ in range(30)]
+        rows = [
+            row(draw.uniform(1, 100), draw.choice([0, draw.uniform(1, 100)]), draw.choice(TESTS))
+            for _ in range(30)
+        ]
         sheet = only_sheet(rows)
         (line,) = artists(sheet, "pareto")[:1]
         corners = list(zip(line.get_xdata(), line.get_ydata()))
@@ -248,16 +284,18 @@ class Labels(unittest.TestCase):
     def check(self, sheet, name):
         boxes = [(text, box_of(sheet, text)) for text in texts(sheet)]
         for text, (x1, y1, x2, y2) in boxes:
-            self.assertTrue(x1 >= 0 and y1 >= 0 and x2 <= plot.WIDTH and y2 <= sheet.height, f"{name}: {text.get_text()} leaves the figure")
+            self.assertTrue(x1 >= 0 and y1 >= 0 and x2 <= plot.WIDTH and y2 <= sheet.height,
+                            f"{name}: {text.get_text()} leaves the figure")
             self.assertGreaterEqual(text.get_fontsize(), 8)
         for (a, p), (b, q) in itertools.combinations(boxes, 2):
             across, down = min(p[2], q[2]) - max(p[0], q[0]), min(p[3], q[3]) - max(p[1], q[1])
-            # Boxes include room for accents and descenders: letters touch only where the boxes share 2 points.
+            # Boxes include room for accents and descenders: letters touch where they share 2 points.
             self.assertFalse(across > 0.5 and down > 2, f"{name}: '{a.get_text()}' on '{b.get_text()}'")
         for label in artists(sheet, "label:"):
             x1, y1, x2, y2 = box_of(sheet, label)
             for x, y in drawn(sheet):
-                self.assertFalse(x1 < x < x2 and y1 + 1 < y < y2 - 1, f"{name}: {label.get_text()} hides a point")
+                self.assertFalse(x1 < x < x2 and y1 + 1 < y < y2 - 1,
+                                 f"{name}: {label.get_text()} hides a point")
 
     # Catches: labels on top of each other, of points or of ticks; text that is cut off or too small to read.
     def test_nothing_overlaps_in_reports_like_the_first_chapters(self):
@@ -279,32 +317,41 @@ class Labels(unittest.TestCase):
     def test_nothing_overlaps_in_odd_reports(self):
         draw = random.Random(8)
         for panels, lines, points in ((1, 1, 1), (1, 9, 4), (3, 2, 9), (4, 7, 3), (5, 3, 5), (16, 2, 2)):
-            rows = [row(10 ** draw.uniform(-2, 4), draw.choice([10 ** draw.uniform(-8, 2), 0, 1.0]), f"technique {j}", f"scene {i}")
-                    for i in range(panels) for j in range(lines) for _ in range(points)]
+            rows = [
+                row(10 ** draw.uniform(-2, 4), draw.choice([10 ** draw.uniform(-8, 2), 0, 1.0]),
+                    f"technique {j}", f"scene {i}") for i in range(panels) for j in range(lines)
+                for _ in range(points)
+            ]
             for join in (False, True):
                 for name, sheet in sheets_of(report(rows, [experiment(join=join)])).items():
                     self.check(sheet, f"{name} {panels} {lines} {points} {join}")
 
     # Catches: ticks that collide, or an axis without any, whatever the span.
     def test_ticks_of_any_span(self):
-        for low, high in ((1, 1), (1, 1.02), (1, 1.5), (3, 40), (1e-3, 1e3), (1e-9, 1e6), (1e-300, 1e300), (5e-324, 1e-300), (1e5, 3e5), (9.7e-8, 9.8e-8)):
+        for low, high in ((1, 1), (1, 1.02), (1, 1.5), (3, 40), (1e-3, 1e3), (1e-9, 1e6), (1e-300, 1e300),
+                          (5e-324, 1e-300), (1e5, 3e5), (9.7e-8, 9.8e-8)):
             for log in (True, False):
                 axis = {"quantity": "error", "log": log}
                 for panels in (1, 3):
-                    rows = [row(float(value), float(value), scene=f"scene {i}") for value in (low, high) for i in range(panels)]
+                    rows = [
+                        row(float(value), float(value), scene=f"scene {i}") for value in (low, high)
+                        for i in range(panels)
+                    ]
                     sheet = only_sheet(rows, y=axis, x={"quantity": "time_ms", "log": log})
                     self.check(sheet, f"{low} {high} {log} {panels}")
                     self.assertGreaterEqual(len(artists(sheet, "tick")), 3, (low, high, log))
 
     # Catches: a colour that means another technique in the next figure.
     def test_a_line_has_one_colour_in_the_whole_report(self):
-        rows = [row(1.0, 1.0, name) for name in TESTS] + [row(1.0, 1.0, name, experiment="f") for name in reversed(TESTS[2:])]
+        rows = [row(1.0, 1.0, name) for name in TESTS]
+        rows += [row(1.0, 1.0, name, experiment="f") for name in reversed(TESTS[2:])]
         first, second = sheets_of(report(rows, [experiment(), experiment("f")])).values()
         for name in TESTS[2:]:
             (one,), (two,) = artists(first, f"point:{name}"), artists(second, f"point:{name}")
             self.assertEqual(one.get_markerfacecolor(), two.get_markerfacecolor())
             self.assertEqual(one.get_marker(), two.get_marker())
-        self.assertEqual(len({artist.get_markerfacecolor() for artist in artists(first, "point:")}), len(TESTS))
+        self.assertEqual(len({artist.get_markerfacecolor() for artist in artists(first, "point:")}),
+                         len(TESTS))
         self.assertEqual(len({artist.get_marker() for artist in artists(first, "point:")}), len(TESTS))
 
 
@@ -312,23 +359,29 @@ class Extras(unittest.TestCase):
     # Catches: a floor or a published figure that is not drawn, or half a figure made into a whole one.
     def test_floors_and_published_figures(self):
         sheets = chapter_one_sheets(1)
-        self.assertEqual(len([a for a in artists(sheets["samples_CPU"], "floor") if hasattr(a, "get_xdata")]), 2)
+        self.assertEqual(len([a for a in artists(sheets["samples_CPU"], "floor") if hasattr(a, "get_xdata")]),
+                         2)
         self.assertEqual(artists(sheets["tests_CPU"], "floor"), [])
-        self.assertEqual(sum(text.get_text() == "floor of the reference" for text in texts(sheets["samples_CPU"])), 2)
+        self.assertEqual(
+            sum(text.get_text() == "floor of the reference" for text in texts(sheets["samples_CPU"])), 2)
         bunny, teaset = sheets["samples_CPU"].panels
         (whole,), (half,) = bunny.published, teaset.published
         self.assertIsNotNone(whole[1])
         self.assertIsNone(half[1])
-        strokes = [artist for artist in artists(sheets["samples_CPU"], "published:") if hasattr(artist, "get_xdata")]
+        strokes = [
+            artist for artist in artists(sheets["samples_CPU"], "published:") if hasattr(artist, "get_xdata")
+        ]
         self.assertEqual([list(artist.get_xdata()) for artist in strokes], [[teaset.x + half[0]] * 2])
         words = " ".join(text.get_text() for text in texts(sheets["samples_CPU"]))
         self.assertIn("Somebody 2010 on a GTX 280", words)
 
-    # Catches: derived quantities with a wrong unit; quartiles that are not shifted or scaled with their median.
+    # Catches: derived quantities with a wrong unit; quartiles that do not move with their median.
     def test_quantities(self):
         one = read(report([row(10.0, 3.0, settings={"n": 7})]))["rows"][0]
-        for quantity, expected in (("time_ms", (10, 9, 12)), ("total_ms", (12, 11, 14)), ("ns_per_test", (10, 9, 12)), ("ms_per_ray", (1e-5, 9e-6, 1.2e-5)),
-                                   ("error", (3, None, None)), ("error.rmse", (3, None, None)), ("settings.n", (7, None, None)), ("bytes", (1000, None, None))):
+        for quantity, expected in (("time_ms", (10, 9, 12)), ("total_ms", (12, 11, 14)),
+                                   ("ns_per_test", (10, 9, 12)), ("ms_per_ray", (1e-5, 9e-6, 1.2e-5)),
+                                   ("error", (3, None, None)), ("error.rmse", (3, None, None)),
+                                   ("settings.n", (7, None, None)), ("bytes", (1000, None, None))):
             for got, want in zip(plot.measure(one, quantity), expected):
                 self.assertTrue(got == want or abs(got - want) < 1e-12 * abs(want), quantity)
         self.assertIsNone(plot.measure(one, "error.other"))
@@ -337,20 +390,27 @@ class Extras(unittest.TestCase):
 
     # Catches: numbers that lose digits or gain some.
     def test_numbers_as_text(self):
-        for value, text in ((0, "0"), (1, "1"), (17, "17"), (1234.5, "1230"), (0.012345, "0.0123"), (9.999, "10.0"), (1e-9, "1.00·10⁻⁹"), (3343968, "3.34·10⁶"),
-                            (99999, "1.00·10⁵"), (math.inf, "∞"), (math.nan, "NaN"), (None, "–"), (-2.5, "−2.50")):
+        for value, text in ((0, "0"), (1, "1"), (17, "17"), (1234.5, "1230"), (0.012345, "0.0123"),
+                            (9.999, "10.0"), (1e-9, "1.00·10⁻⁹"), (3343968, "3.34·10⁶"), (99999, "1.00·10⁵"),
+                            (math.inf, "∞"), (math.nan, "NaN"), (None, "–"), (-2.5, "−2.50")):
             self.assertIn(plot.rounded(value), (text, text.replace("1.00·10⁵", "100000")), value)
-        self.assertEqual([plot.plain(value) for value in (1000, 0.25, 1e-18, 1e22)], ["1000", "0.25", "1e-18", "1e22"])
+        self.assertEqual([plot.plain(value) for value in (1000, 0.25, 1e-18, 1e22)],
+                         ["1000", "0.25", "1e-18", "1e22"])
 
     # Catches: a report of a later chapter that says nothing of its experiments, and is not drawn.
     def test_a_report_without_experiments_is_drawn(self):
-        document = report([row(1.0, 1.0, name, scene, backend) for name in TESTS for scene in "ab" for backend in ("cpu", "cuda")])
+        document = report([
+            row(1.0, 1.0, name, scene, backend) for name in TESTS for scene in "ab"
+            for backend in ("cpu", "cuda")
+        ])
         del document["experiments"]
         self.assertEqual(set(sheets_of(document)), {"e_CPU", "e_CUDA"})
 
     # Catches: plots that share an experiment's rows and do not find them; what was left out, not said.
     def test_several_plots_of_the_same_rows(self):
-        document = report([row(1.0, 1.0), row(2.0, 0.5)], [experiment("one", rows_of="e"), experiment("two", x="total_ms", rows_of="e")])
+        document = report([row(1.0, 1.0), row(2.0, 0.5)],
+                          [experiment("one", rows_of="e"),
+                           experiment("two", x="total_ms", rows_of="e")])
         document["left_out"] = ["e: the time was up"]
         sheets = sheets_of(document)
         self.assertEqual(set(sheets), {"one_CPU", "two_CPU"})
@@ -372,14 +432,16 @@ class Program(unittest.TestCase):
             self.assertEqual((one.returncode, two.returncode, one.stderr), (0, 0, ""))
             files = sorted(os.listdir(first))
             self.assertEqual(files, sorted(set(os.listdir(second)) - {"matplotlibrc"}))
-            self.assertEqual([os.path.join(first, file) for file in files], sorted(one.stdout.split("\n")[:-1]))
-            self.assertEqual(set(files), {f"{base}.{kind}" for base in ("tests_cpu", "triangles", "samples_cpu", "stability_cpu", "failures_cpu")
-                                          for kind in ("svg", "png")} | {"tables.md"})
+            self.assertEqual([os.path.join(first, file) for file in files],
+                             sorted(one.stdout.split("\n")[:-1]))
+            names = ("tests_cpu", "triangles", "samples_cpu", "stability_cpu", "failures_cpu")
+            figures = {f"{name}.{kind}" for name in names for kind in ("svg", "png")}
+            self.assertEqual(set(files), figures | {"tables.md"})
             for file in files:
                 with open(os.path.join(first, file), "rb") as a, open(os.path.join(second, file), "rb") as b:
                     self.assertEqual(a.read(), b.read(), file)
 
-    # Catches: a refusal in several lines, with the wrong code, without the file's name, or that leaves files behind.
+    # Catches: a refusal in several lines, with the wrong code, without the file's name, or that leaves files.
     def test_broken_inputs_are_refused_in_one_line(self):
         good = report([row()])
 
@@ -393,15 +455,29 @@ class Program(unittest.TestCase):
             return change(rows=[{key: value for key, value in row().items() if key != name}])
 
         cases = {
-            "empty": ("", "report.json"), "broken": ('{"chapter": "x",', "line 1"), "list": ("[]", "object"), "deep": ("[" * 100000, "deep"),
-            "not UTF-8": (None, "utf-8"), "no rows": ({"chapter": "x"}, '"rows"'), "no chapter": ({"rows": []}, '"chapter"'),
-            "rows": (change(rows=5), '"rows"'), "row": (change(rows=[5]), "rows[0]"), "no error": (without("error"), '"error"'),
-            "no technique": (without("technique"), '"technique"'), "no experiment": (without("experiment"), '"experiment"'),
-            "number": (of_row(bytes="many"), "bytes"), "negative": (of_row(y=-1.0), "negative"), "minus infinity": (of_row(y="-Infinity"), "negative"),
-            "quantity": (change(experiments=[experiment(x="speed")]), "speed"), "axis": (change(experiments=[{"name": "e"}]), '"x"'),
-            "field": (change(experiments=[experiment(line=["tecnique"])]), "tecnique"), "twice": (change(experiments=[experiment(), experiment()]), "two"),
-            "setting": (change(rows=[row(settings={"n": "many"})], experiments=[experiment(x="settings.n")]), "many"),
-            "nested setting": (of_row(settings={"n": [1]}), "settings.n"), "published": (of_row(published={"time_ms": 1}), '"by"'),
+            "empty": ("", "report.json"),
+            "broken": ('{"chapter": "x",', "line 1"),
+            "list": ("[]", "object"),
+            "deep": ("[" * 100000, "deep"),
+            "not UTF-8": (None, "utf-8"),
+            "no rows": ({"chapter": "x"}, '"rows"'),
+            "no chapter": ({"rows": []}, '"chapter"'),
+            "rows": (change(rows=5), '"rows"'),
+            "row": (change(rows=[5]), "rows[0]"),
+            "no error": (without("error"), '"error"'),
+            "no technique": (without("technique"), '"technique"'),
+            "no experiment": (without("experiment"), '"experiment"'),
+            "number": (of_row(bytes="many"), "bytes"),
+            "negative": (of_row(y=-1.0), "negative"),
+            "minus infinity": (of_row(y="-Infinity"), "negative"),
+            "quantity": (change(experiments=[experiment(x="speed")]), "speed"),
+            "axis": (change(experiments=[{"name": "e"}]), '"x"'),
+            "field": (change(experiments=[experiment(line=["tecnique"])]), "tecnique"),
+            "twice": (change(experiments=[experiment(), experiment()]), "two"),
+            "setting": (change(rows=[row(settings={"n": "many"})],
+                               experiments=[experiment(x="settings.n")]), "many"),
+            "nested setting": (of_row(settings={"n": [1]}), "settings.n"),
+            "published": (of_row(published={"time_ms": 1}), '"by"'),
             "newlines": (change(rows=[row(technique="a\nb", bytes="x\ny")]), "bytes"),
         }
         for name, (content, words) in cases.items():
@@ -430,7 +506,8 @@ class Program(unittest.TestCase):
             self.assertEqual((code, out, err.count("\n")), (1, "", 1))
         for arguments in ((), ("a", "b"), ("a", "--no-such-flag"), ("a", "--out")):
             result = run(*arguments)
-            self.assertEqual((result.returncode, result.stdout, result.stderr.count("\n")), (2, "", 1), result.stderr)
+            self.assertEqual((result.returncode, result.stdout, result.stderr.count("\n")), (2, "", 1),
+                             result.stderr)
 
     @staticmethod
     def call(*arguments):
@@ -460,11 +537,19 @@ class Program(unittest.TestCase):
 
     # Catches: names that are read as mathematics, markup or a path, and text that breaks XML or a table.
     def test_hostile_names(self):
-        names = ["$x_1$ $\\frac{$", "a|b & <c> \"d\" 100 %", "../../etc/passwd", "größer → 光 \u202e", "x" * 200, "nul\x00 \x1b[31m", "\ud800", "", "`code` *b* [l](u)",
-                 "many words " * 20]
-        rows = [row(float(i + 1), 1.0 / (i + 1), a, b, settings={a or "s": b}, experiment="e", published={"time_ms": 2.0, "by": a, "hardware": b})
-                for i, (a, b) in enumerate(itertools.product(names, names))]
-        document = report(rows, [experiment(title=names[1], note=names[0], figure=["technique"], line=["scene"], panel=["settings." + names[0]])])
+        names = [
+            "$x_1$ $\\frac{$", "a|b & <c> \"d\" 100 %", "../../etc/passwd", "größer → 光 \u202e", "x" * 200,
+            "nul\x00 \x1b[31m", "\ud800", "", "`code` *b* [l](u)", "many words " * 20
+        ]
+        rows = [
+            row(float(i + 1), 1.0 / (i + 1), a, b, settings={a or "s": b}, experiment="e",
+                published={"time_ms": 2.0, "by": a, "hardware": b})
+            for i, (a, b) in enumerate(itertools.product(names, names))
+        ]
+        document = report(rows, [
+            experiment(title=names[1], note=names[0], figure=["technique"], line=["scene"],
+                       panel=["settings." + names[0]])
+        ])
         document["device"]["cpu"] = "cpu " * 100
         with Folder(report=document) as folder, Folder() as out:
             code, _, err = self.call(folder, "--out", os.path.join(out, "new"))
@@ -486,12 +571,16 @@ class Program(unittest.TestCase):
             for text in texts(sheet):
                 x1, _, x2, _ = box_of(sheet, text)
                 self.assertTrue(x1 >= 0 and x2 <= plot.WIDTH, text.get_text())
-                self.assertTrue(not text.get_parse_math() or text.get_gid().startswith("tick"), text.get_text())
+                self.assertTrue(not text.get_parse_math() or text.get_gid().startswith("tick"),
+                                text.get_text())
 
     # Catches: points that are lost among many, and time that grows with their square.
     def test_thousands_of_rows(self):
         draw = random.Random(9)
-        rows = [row(10 ** draw.uniform(0, 3), draw.choice([0, INF, 10 ** draw.uniform(-5, 5)]), draw.choice(TESTS), f"scene {i % 4}") for i in range(6000)]
+        rows = [
+            row(10 ** draw.uniform(0, 3), draw.choice([0, INF, 10 ** draw.uniform(-5, 5)]),
+                draw.choice(TESTS), f"scene {i % 4}") for i in range(6000)
+        ]
         start = time.monotonic()
         sheet = only_sheet(rows)
         self.assertLess(len(sheet.svg()), 5e6)
@@ -509,13 +598,16 @@ class Stability(unittest.TestCase):
         document = stability()
         sheets = plot.draw_stability(self.read(document), "cpu")
         count = lambda start: sum(len(artists(sheet, start)) for _, sheet in sheets)
-        self.assertEqual(count("alarm:"), sum(1 for one in document["rows"] if one["failures"] and not one["by_nature"]))
-        self.assertEqual(count("nature:"), sum(1 for one in document["rows"] if one["failures"] and one["by_nature"]))
+        self.assertEqual(count("alarm:"),
+                         sum(1 for one in document["rows"] if one["failures"] and not one["by_nature"]))
+        self.assertEqual(count("nature:"),
+                         sum(1 for one in document["rows"] if one["failures"] and one["by_nature"]))
         words = [text.get_text() for _, sheet in sheets for text in texts(sheet)]
-        self.assertEqual(sum(1 for word in words if word == "0 of 4\u2009096"), sum(1 for one in document["rows"] if not one["failures"]))
+        self.assertEqual(sum(1 for word in words if word == "0 of 4\u2009096"),
+                         sum(1 for one in document["rows"] if not one["failures"]))
         self.assertEqual(sum(1 for word in words if word.startswith("✗")), count("alarm:"))
         for case in range(25):
-            self.assertIn(f"case {case}", words)
+            self.assertTrue(any(f"{word} ".startswith(f"case {case} ") for word in words))
 
     # Catches: a table that does not fit, however many cases and techniques it has.
     def test_any_size_fits(self):
@@ -533,7 +625,8 @@ class Stability(unittest.TestCase):
 
     # Catches: rates that are rounded to none or to all.
     def test_rates(self):
-        for failures, of, text in ((0, 10, "0 of 10"), (10, 10, "all"), (0, 0, "not run"), (1, 4096, "1 of 4\u2009096"), (4095, 4096, "99.9 %"), (37, 100, "37 %"),
+        for failures, of, text in ((0, 10, "0 of 10"), (10, 10, "all"), (0, 0, "not run"),
+                                   (1, 4096, "1 of 4\u2009096"), (4095, 4096, "99.9 %"), (37, 100, "37 %"),
                                    (3, 112800000, "3 of 1.13·10⁸"), (112799999, 112800000, "99.9 %")):
             self.assertEqual(plot.rate_text(plot.Cell(failures, of, None, "", False, "", None)), text)
 
@@ -546,10 +639,12 @@ class Stability(unittest.TestCase):
             os.mkdir(os.path.join(folder, "pictures"))
             sizes = [64, 96, 128, 100, 300, 64, 64]
             for i, size in enumerate(sizes):
-                matplotlib.image.imsave(os.path.join(folder, f"pictures/{i}.png"), np.random.default_rng(i).random((size, size, 3)))
+                matplotlib.image.imsave(os.path.join(folder, f"pictures/{i}.png"),
+                                        np.random.default_rng(i).random((size, size, 3)))
             err = io.StringIO()
             with contextlib.redirect_stderr(err):
-                ((_, sheet),) = plot.draw_failures(plot.read_stability(os.path.join(folder, "stability.json")), "cpu")
+                table = plot.read_stability(os.path.join(folder, "stability.json"))
+                ((_, sheet),) = plot.draw_failures(table, "cpu")
             self.assertEqual(err.getvalue().count("\n"), 1)
             self.assertIn("1 picture is missing", err.getvalue())
             self.assertIn("pictures/7.png: No such file", err.getvalue())
