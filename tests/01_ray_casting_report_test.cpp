@@ -2,7 +2,9 @@
 
 #include <gmpxx.h>
 
+#include <memory>
 #include <set>
+#include <utility>
 
 #include "chapters/01_ray_casting/error_bounds.h"
 #include "chapters/01_ray_casting/experiments.h"
@@ -49,7 +51,11 @@ TEST_CASE("the ground truth is what rational arithmetic says") {
   const std::size_t n = effort(11000);
   for (std::size_t i = 0; i < n; ++i) {
     Random random(21, i);
-    const Pair p = make_pair(random, static_cast<PairKind>(i % (pair_kinds - 1)));
+    Pair p = make_pair(random, static_cast<PairKind>(i % (pair_kinds - 1)));
+    if (i % 10 == 9) {  // small integers: origins in the plane, rays through vertices and edges, exactly
+      for (vec3* v : {&p.a, &p.b, &p.c, &p.ray.origin, &p.ray.direction})
+        for (int k = 0; k < 3; ++k) (*v)[k] = static_cast<float>(random.index(5)) - 2;
+    }
     const Point o(p.ray.origin), d(p.ray.direction);
     const Point a = Point(p.a) - o, b = Point(p.b) - o, c = Point(p.c) - o, normal = cross(b - a, c - a);
     const Exact w[3] = {dot(d, cross(b, c)), dot(d, cross(c, a)), dot(d, cross(a, b))};
@@ -81,7 +87,7 @@ TEST_CASE("the report shows what is planted in a test") {
   const std::vector<Contestant> all = test_contestants();
   const Contestant reference = find(all, "watertight", "double");
   const Contestant sound = find(all, "watertight", "float");
-  Contestant off = sound, forgetful = sound, hasty = sound;
+  Contestant off = sound, forgetful = sound, hasty = sound, lazy = sound, hidden = sound;
   off.technique = "off";
   off.answer = [&](const Stream& stream, const std::vector<Pair>& pairs) {
     auto answers = sound.answer(stream, pairs);
@@ -100,24 +106,42 @@ TEST_CASE("the report shows what is planted in a test") {
       if (a.hit != 0 && ++hits % 100000 == 0) a = {};
     return answers;
   };
-  hasty.technique = "hasty";
+  hasty.technique = "hasty";  // asks every second triangle
   hasty.prepare = [&](const Stream& stream, const Mesh& mesh, const std::vector<Ray>& rays) {
     Mesh half = mesh;
     half.triangles.resize(mesh.triangles.size() / 2);
     return sound.prepare(stream, half, rays);
+  };
+  lazy.technique = "lazy";  // works once and then says that again
+  lazy.prepare = [&](const Stream& stream, const Mesh& mesh, const std::vector<Ray>& rays) {
+    Tracer tracer = sound.prepare(stream, mesh, rays);
+    tracer.trace = [trace = tracer.trace, done = std::make_shared<bool>(false)] {
+      if (!std::exchange(*done, true)) trace();
+    };
+    return tracer;
+  };
+  hidden.technique = "hidden";  // wrong by 3 ulps where it is timed, right where it is asked for pairs
+  hidden.prepare = [&](const Stream& stream, const Mesh& mesh, const std::vector<Ray>& rays) {
+    Tracer tracer = sound.prepare(stream, mesh, rays);
+    tracer.hits = [hits = tracer.hits] {
+      auto wrong = hits();
+      for (auto& hit : wrong) hit.t *= 1 + 3 * 0x1p-23;
+      return wrong;
+    };
+    return tracer;
   };
 
   for (const Backend backend : backends()) {
     ReportOptions options;
     options.backends = {backend};
     Report report(options);
-    Experiment planted{
-        "planted", 1, {}, [&](Report& to) {
-          TestEffort effort{1u << 20, 4096, 4096};
-          measure_tests(to, backend, {sound, off, forgetful, hasty}, reference, {PairKind::random}, effort);
-        }};
+    Experiment planted{"planted", 1, {}, [&](Report& to) {
+                         TestEffort effort{1u << 20, 4096, 4096};
+                         measure_tests(to, backend, {sound, off, forgetful, hasty, lazy, hidden}, reference,
+                                       {PairKind::random}, effort);
+                       }};
     report.run({planted});
-    REQUIRE(report.rows().size() == 4);
+    REQUIRE(report.rows().size() == 6);
     const Row &good = report.rows()[0], &three = report.rows()[1], &dropped = report.rows()[2],
               &skipped = report.rows()[3];
     CHECK(error(good, "t_ulps").value.high < 1);
@@ -125,7 +149,13 @@ TEST_CASE("the report shows what is planted in a test") {
     const double rounding = error(good, "false_misses").value.value;  // at borders
     CHECK(rounding < 5e-6);
     CHECK(error(dropped, "false_misses").value.value - rounding == Approx(1e-5).margin(2e-6));
+    const double hits = error(good, "timed_hits").value.value;
+    CHECK(hits > 1000);
     CHECK(error(good, "mismatches").value.value == 0);
+    CHECK(error(good, "inconsistent").value.value == 0);
+    CHECK(error(report.rows()[4], "mismatches").value.value > hits / 2);
+    CHECK(error(report.rows()[5], "inconsistent").value.value > hits / 2);
+    CHECK(error(report.rows()[5], "t_ulps").value.high < 1);
     CHECK(error(skipped, "mismatches").value.value > 100);
     CHECK(error(good, "beyond_bound").value.value == 0);
     CHECK(good.primitive_tests == 4096.0 * 4096.0);

@@ -38,14 +38,7 @@ void trace_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& 
                                                 std::uint32_t);                                             \
   template void trace_triangles(const Stream&, Loop, const Triangles<Test, T>&, const RayOf<T>*, HitOf<T>*, \
                                 std::size_t);
-INSTANTIATE(PlaneBarycentric, float)
-INSTANTIATE(MollerTrumbore, float)
-INSTANTIATE(BaldwinWeber, float)
-INSTANTIATE(Watertight, float)
-INSTANTIATE(PlaneBarycentric, double)
-INSTANTIATE(MollerTrumbore, double)
-INSTANTIATE(BaldwinWeber, double)
-INSTANTIATE(Watertight, double)
+TRILHA_EVERY_TEST_AND_SCALAR(INSTANTIATE)
 #undef INSTANTIATE
 
 }  // namespace trilha

@@ -24,6 +24,11 @@ class RayCastingDemo final : public Demo {
           "sheared edge functions of exact sign (Woop et al. 2013); 36 bytes"}},
         Effect::rebuild, "the ray-triangle test");
     settings.choice(
+        "scalar", settings_.scalar,
+        {{int(Scalar::single_precision), "float", "24 bits, seven digits"},
+         {int(Scalar::double_precision), "double", "53 bits: twice the memory, about twice the time"}},
+        Effect::rebuild, "what the test computes in; rays and hits stay float");
+    settings.choice(
         "loop", settings_.loop,
         {{int(Loop::plain), "plain", "one triangle after the other, as the lesson has it"},
          {int(Loop::blocked), "blocked", "CPU: 16 triangles at once; CUDA: tiles in shared memory"}},

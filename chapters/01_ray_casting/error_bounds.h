@@ -136,10 +136,9 @@ TRILHA_HD inline Edges<W> watertight_edges(const vec3& a, const vec3& b, const v
     // x' = (x − o) − S·(z − o): a rounding each for x − o, z − o and S, and one for the fused operation
     const W shift_x = std::fabs(W(vertices[i][k.kx]) - W(ray.origin[k.kx]));
     const W shift_y = std::fabs(W(vertices[i][k.ky]) - W(ray.origin[k.ky]));
-    x_error[i] =
-        u * std::fabs(x[i]) + rounded * (shift_x + std::fabs(k.shear_x * edges.depth[i])) + subnormal<T>;
-    y_error[i] =
-        u * std::fabs(y[i]) + rounded * (shift_y + std::fabs(k.shear_y * edges.depth[i])) + subnormal<T>;
+    const W lost = (1 + std::fabs(edges.depth[i])) * subnormal<T>;  // by underflow, here and in S
+    x_error[i] = u * std::fabs(x[i]) + rounded * (shift_x + std::fabs(k.shear_x * edges.depth[i])) + lost;
+    y_error[i] = u * std::fabs(y[i]) + rounded * (shift_y + std::fabs(k.shear_y * edges.depth[i])) + lost;
   }
   for (int i = 0; i < 3; ++i) {
     const int p = (i + 2) % 3, q = (i + 1) % 3;
@@ -172,7 +171,7 @@ TRILHA_HD inline W bound(Watertight, const vec3& a, const vec3& b, const vec3& c
   if (!(left > 0)) return static_cast<W>(infinity);
   // what comes after the edge functions: det and weight (3 roundings), the weighted mean (3), z itself (1)
   const W mean = (rounded * z_size + 2 * subnormal<T>)*std::fabs(det) / left;
-  return (weighted / left * (1 + 4 * u) + mean) / std::fabs(dz) + 2 * u * std::fabs(W(t));
+  return (weighted / left * (1 + 4 * u) + mean) / std::fabs(dz) + 2 * u * std::fabs(W(t)) + subnormal<T>;
 }
 
 }  // namespace error_bounds

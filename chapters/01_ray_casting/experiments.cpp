@@ -53,6 +53,7 @@ Contestant contestant(TriangleTest test, Loop loop) {
       trace_triangles(stream, loop, Triangles<Test, T>{held->numbers.data(), count, false}, held->rays.data(),
                       held->hits.data(), held->rays.size());
     };
+    tracer.forget = [=] { fill_bytes(stream, held->hits.data(), 0xff, held->hits.bytes()); };
     tracer.hits = [=] {
       std::vector<HitOf<double>> hits;
       for (const HitOf<T>& hit : held->hits.to_vector(stream))
@@ -74,14 +75,6 @@ double float_ulp(long double x) {
   const auto size = static_cast<float>(std::fabs(x));
   return static_cast<double>(std::nextafter(size, std::numeric_limits<float>::infinity())) -
          static_cast<double>(size);
-}
-
-/// The p-quantile with the order statistics that hold it with 95 % confidence.
-Estimate quantile_estimate(const std::vector<double>& sorted, double p) {
-  const auto n = static_cast<double>(sorted.size());
-  const double half = z95 * std::sqrt(n * p * (1 - p));
-  const auto at = [&](double rank) { return sorted[static_cast<std::size_t>(std::clamp(rank, 0.0, n - 1))]; };
-  return {quantile(sorted, p), at(std::floor(n * p - half)), at(std::ceil(n * p + half))};
 }
 
 void add_quantiles(std::vector<Error>& errors, const std::string& kind, std::vector<double> values) {
@@ -147,56 +140,93 @@ std::vector<Error> pair_errors(const std::vector<Pair>& pairs, const std::vector
     beyond += e.beyond, unbounded += e.unbounded;
     if (e.compared) t_ulps.push_back(e.t_ulps), uv_ulps.push_back(e.uv_ulps);
   }
+  const auto compared = static_cast<double>(t_ulps.size());
   std::vector<Error> errors;
   add_quantiles(errors, "t_ulps", std::move(t_ulps));
   add_quantiles(errors, "uv_ulps", std::move(uv_ulps));
   errors.push_back({"false_hits", proportion(false_hits, misses)});
   errors.push_back({"false_misses", proportion(false_misses, hits)});
   errors.push_back({"false_decisions", proportion(false_hits + false_misses, hits + misses)});
+  errors.push_back({"compared", compared});
   errors.push_back({"beyond_bound", beyond});
   errors.push_back({"unbounded", unbounded});
   return errors;
 }
 
-/// Hits that no rounding explains: another answer than the reference's, whose t is further from it than the
-/// two bounds together. Another triangle at the same t is a tie.
-struct Comparison {
-  double mismatches = 0, ties = 0;
-};
-Comparison compare_hits(const Mesh& mesh, const std::vector<Ray>& rays,
-                        const std::vector<HitOf<double>>& hits, const std::vector<HitOf<double>>& reference,
-                        const Contestant& contestant, const Contestant& reference_contestant) {
-  Comparison result;
+/// How a timed trace compares with the reference's and with what the contestant answers to single pairs; see
+/// measure_tests.
+std::vector<Error> trace_errors(const Stream& stream, const Mesh& mesh, const std::vector<Ray>& rays,
+                                const std::vector<HitOf<double>>& hits,
+                                const std::vector<HitOf<double>>& reference, const Contestant& contestant,
+                                const Contestant& reference_contestant) {
+  double mismatches = 0, ties = 0, unbounded = 0, inconsistent = 0;
+  const auto pair_of = [&](std::uint32_t primitive, const Ray& ray) {
+    const uvec3 t = mesh.triangles[primitive];
+    return Pair{mesh.positions[t.x], mesh.positions[t.y], mesh.positions[t.z], ray};
+  };
+  const auto bound = [](const Contestant& who, const Pair& p, double t) {
+    return who.bound(p.a, p.b, p.c, p.ray, t);
+  };
+  std::vector<Pair> pairs;
+  std::vector<std::size_t> found;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const HitOf<double>&hit = hits[i], &expected = reference[i];
-    if (!hit.found() && !expected.found()) continue;
-    if (!hit.found() || !expected.found()) {
-      result.mismatches += 1;
+    if (hit.found() && hit.primitive >= mesh.triangles.size()) {
+      mismatches += 1;  // no such triangle
       continue;
     }
-    const auto bound = [&](const Contestant& who, const HitOf<double>& of) {
-      const uvec3 t = mesh.triangles[of.primitive];
-      return who.bound(mesh.positions[t.x], mesh.positions[t.y], mesh.positions[t.z], rays[i], of.t);
-    };
-    const double allowed = bound(contestant, hit) + bound(reference_contestant, expected);
-    if (!(std::fabs(hit.t - expected.t) <= allowed))
-      result.mismatches += 1;
-    else
-      result.ties += hit.primitive != expected.primitive;
+    if (hit.found()) pairs.push_back(pair_of(hit.primitive, rays[i])), found.push_back(i);
+    if (hit.found() != expected.found()) {
+      mismatches += 1;
+    } else if (hit.found()) {
+      const double allowed = bound(contestant, pairs.back(), hit.t) +
+                             bound(reference_contestant, pair_of(expected.primitive, rays[i]), expected.t);
+      if (!(allowed < error_bounds::infinity))
+        unbounded += 1;
+      else if (!(std::fabs(hit.t - expected.t) <= allowed))
+        mismatches += 1;
+      else
+        ties += hit.primitive != expected.primitive;
+    }
   }
-  return result;
+  const std::vector<Answer<double>> alone = contestant.answer(stream, pairs);
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const HitOf<double>& hit = hits[found[k]];
+    inconsistent += alone[k].hit == 0 || hit.t != alone[k].t || hit.u != alone[k].u || hit.v != alone[k].v;
+  }
+  return {{"mismatches", mismatches},
+          {"ties", ties},
+          {"timed_unbounded", unbounded},
+          {"inconsistent", inconsistent},
+          {"timed_hits", static_cast<double>(pairs.size())}};
 }
 
-/// The first triangles of the pairs, shrunk to a 32nd: as in a scene, a ray hits few of those that it asks.
-Mesh small_triangles(const std::vector<Pair>& pairs, std::size_t count) {
+/// The first triangles of the pairs, shrunk to a 32nd about the point where their ray hits them, or else
+/// about a vertex: as in a scene, a ray hits few of those that it asks.
+Mesh small_triangles(const std::vector<Pair>& pairs, const std::vector<Truth>& truths, std::size_t count) {
   Mesh mesh;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const vec3& a = pairs[i].a;
-    for (const vec3& vertex : {a, pairs[i].b, pairs[i].c}) mesh.positions.push_back(a + (vertex - a) / 32.0f);
+    const Pair& p = pairs[i];
+    const dvec3 hit = dvec3(p.ray.origin) + static_cast<double>(truths[i].t) * dvec3(p.ray.direction);
+    const dvec3 centre = truths[i].hit ? hit : dvec3(p.a);
+    for (const vec3& vertex : {p.a, p.b, p.c})
+      mesh.positions.push_back(vec3(centre + (dvec3(vertex) - centre) / 32.0));
     mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
   }
   return mesh;
 }
+
+/// One thread for the CPU, until this goes out of scope.
+class OneThread {
+ public:
+  OneThread() { set_thread_count(1); }
+  ~OneThread() { set_thread_count(before_); }
+  OneThread(const OneThread&) = delete;
+  OneThread& operator=(const OneThread&) = delete;
+
+ private:
+  int before_ = thread_count();
+};
 
 // ---- images ------------------------------------------------------------------
 
@@ -211,18 +241,34 @@ Scene sphere_scene(const std::string& name, Mesh mesh, const dvec3& centre) {
   return scene;
 }
 
-/// Image time over the number of triangles.
+/// A caster with what it took to build.
+struct Entry {
+  std::unique_ptr<RayCaster> caster;
+  double build_ms, bytes;
+};
+Entry build_caster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream) {
+  Entry entry{};
+  const auto before = static_cast<double>(live_bytes(stream.backend()));
+  const auto build = [&] {
+    entry.caster.reset();
+    entry.caster = std::make_unique<RayCaster>(scene, settings, stream);
+  };
+  entry.build_ms = take_turns(stream, {build}, {5, 0})[0].median;
+  entry.bytes = static_cast<double>(live_bytes(stream.backend())) - before;
+  return entry;
+}
+
+/// Image time over the number of triangles, 10² to 10⁵.
 void measure_triangles(Report& report) {
   const double per_decade = 2;
-  for (const Backend backend : report.backends()) {
-    const Stream stream(backend);
-    const bool device = backend == Backend::cuda;
-    const int width = device ? 1280 : 128, height = device ? 720 : 96;
-    for (int step = 0; step <= 3 * per_decade; ++step) {
+  for (int step = 0; step <= 3 * per_decade; ++step) {
+    for (const Backend backend : report.backends()) {
+      const Stream stream(backend);
+      const bool device = backend == Backend::cuda;
+      const int width = device ? 1280 : 128, height = device ? 720 : 96;
       const double wanted = std::pow(10.0, 2 + step / per_decade);
       if (!report.keep_going()) {
-        report.leave_out("triangles: " + std::to_string(std::lround(wanted)) + " on " + name(backend) +
-                         ": the time was up");
+        report.leave_out(std::to_string(std::lround(wanted)) + " triangles, " + name(backend));
         continue;
       }
       const int stacks = std::max(3, static_cast<int>(std::lround(std::sqrt(wanted / 4))) + 1);
@@ -240,28 +286,13 @@ void measure_triangles(Report& report) {
       tracer.trace();
       const std::vector<HitOf<double>> expected = tracer.hits();
 
-      struct Entry {
-        std::unique_ptr<RayCaster> caster;
-        double build_ms, bytes;
-      };
       std::vector<Entry> entries;
       std::vector<std::function<void()>> work;
       Film film(stream, width, height);
       for (const TriangleTest test : all_triangle_tests) {
         RayCastingSettings settings;
         settings.test = test;
-        std::vector<double> build_ms;
-        Entry entry{};
-        for (int repeat = 0; repeat < 6; ++repeat) {
-          entry.caster.reset();
-          const auto before = static_cast<double>(live_bytes(backend));
-          Timer timer(stream);
-          entry.caster = std::make_unique<RayCaster>(scene, settings, stream);
-          if (repeat > 0) build_ms.push_back(timer.milliseconds());
-          entry.bytes = static_cast<double>(live_bytes(backend)) - before;
-        }
-        entry.build_ms = summary(build_ms).median;
-        entries.push_back(std::move(entry));
+        entries.push_back(build_caster(scene, settings, stream));
         RayCaster* caster = entries.back().caster.get();
         work.push_back([&film, &scene, caster] {
           caster->add_sample(film, scene.camera, 0, false, 0, 400, [](double) { return true; });
@@ -278,7 +309,6 @@ void measure_triangles(Report& report) {
         const Contestant mine = with_test(all_triangle_tests[k], [&](auto test) {
           return contestant<decltype(test), float>(all_triangle_tests[k], Loop::blocked);
         });
-        const Comparison found = compare_hits(mesh, rays, hits, expected, mine, reference);
         const auto triangles = static_cast<double>(mesh.triangles.size());
         const double pixels = double(width) * height;
         Row row;
@@ -286,16 +316,17 @@ void measure_triangles(Report& report) {
         row.backend = backend;
         row.technique = mine.technique;
         row.settings = {{"triangles", triangles}, {"width", double(width)}, {"height", double(height)}};
+        if (!device) row.settings["threads"] = double(thread_count());
         row.time_ms = times[k];
-        row.errors = {{"mismatches", found.mismatches}, {"ties", found.ties}};
+        row.errors = trace_errors(stream, mesh, rays, hits, expected, mine, reference);
         row.build_ms = entries[k].build_ms;
         row.rays = pixels;
         row.primitive_tests = pixels * triangles;
         row.bytes = entries[k].bytes;
         report.add(std::move(row));
       }
-      report.progress((step + 1) / (3 * per_decade + 1));
     }
+    report.progress((step + 1) / (3 * per_decade + 1));
   }
 }
 
@@ -309,36 +340,42 @@ void measure_samples(Report& report) {
     const bool device = backend == Backend::cuda;
     for (const auto& [where, sizes] : places) {
       if (!report.keep_going()) {
-        report.leave_out(std::string("samples: ") + where + ", " + name(backend) + ": the time was up");
+        report.leave_out(std::string(where) + ", " + name(backend));
         continue;
       }
       const dvec3 centre = dvec3(vec3(glm::normalize(dvec3(148376, 1234, -223423)) * sizes));
       const Scene scene = sphere_scene(where, icosphere(3, 1, centre), centre);
-      std::vector<std::unique_ptr<RayCaster>> casters;
+      std::vector<Entry> entries;
       std::vector<Renderer> renderers;
-      for (const TriangleTest test : all_triangle_tests) {
-        RayCastingSettings settings;
-        settings.test = test;
-        const auto before = static_cast<double>(live_bytes(backend));
-        Timer timer(stream);
-        casters.push_back(std::make_unique<RayCaster>(scene, settings, stream));
-        RayCaster* caster = casters.back().get();
-        Renderer renderer;
-        renderer.technique = name(test);
-        renderer.settings = {{"triangles", double(scene.triangle_count())}};
-        renderer.build_ms = timer.milliseconds();
-        renderer.bytes = static_cast<double>(live_bytes(backend)) - before;
-        renderer.add_sample = [caster, &scene](Film& film, std::uint32_t index, std::uint64_t seed) {
-          caster->add_sample(film, scene.camera, index, true, seed, 400, [](double) { return true; });
-        };
-        renderers.push_back(std::move(renderer));
-      }
+      for (const TriangleTest test : all_triangle_tests)
+        for (const Scalar scalar : {Scalar::single_precision, Scalar::double_precision}) {
+          if (scalar == Scalar::double_precision && test != TriangleTest::watertight) continue;
+          RayCastingSettings settings;
+          settings.test = test;
+          settings.scalar = scalar;
+          entries.push_back(build_caster(scene, settings, stream));
+          RayCaster* caster = entries.back().caster.get();
+          Renderer renderer;
+          renderer.technique = name(test);
+          renderer.settings = {{"triangles", double(scene.triangle_count())}};
+          if (!device) renderer.settings["threads"] = double(thread_count());
+          renderer.build_ms = entries.back().build_ms;
+          renderer.bytes = entries.back().bytes;
+          renderer.add_sample = [caster, &scene](Film& film, std::uint32_t index, std::uint64_t seed,
+                                                 const KeepGoing& keep_going) {
+            return caster->add_sample(film, scene.camera, index, true, seed, 400,
+                                      [&](double) { return keep_going(); });
+          };
+          renderers.push_back(std::move(renderer));
+        }
+      const Renderer reference = std::move(renderers.back());  // in double
+      renderers.pop_back();
       Accumulation what;
       what.scene = where;
-      what.width = device ? 1280 : 96;
-      what.height = device ? 960 : 72;
+      what.width = device ? 640 : 96;
+      what.height = device ? 480 : 72;
       what.seconds = report.left_s() / runs_left--;
-      accumulate(report, stream, renderers.back(), renderers, what);
+      accumulate(report, stream, reference, renderers, what);
     }
   }
 }
@@ -370,14 +407,14 @@ void measure_tests(Report& report, const Stream& stream, const std::vector<Conte
   for (const PairKind kind : kinds) {
     const std::string kind_name = pair_kind_texts[static_cast<int>(kind)].name;
     if (!report.keep_going()) {
-      report.leave_out("tests: " + kind_name + ", " + name(stream.backend()) + ": the time was up");
+      report.leave_out(kind_name + ", " + name(stream.backend()));
       continue;
     }
     const std::vector<Pair> pairs =
         make_pairs(kind, std::max(effort.pairs, effort.rays), 1000 * report.seed() + std::uint64_t(kind));
     std::vector<Truth> truths(pairs.size());
     for_each(Backend::cpu, pairs.size(), FindTruths{pairs.data(), truths.data()});
-    const Mesh mesh = small_triangles(pairs, effort.triangles);
+    const Mesh mesh = small_triangles(pairs, truths, effort.triangles);
     std::vector<Ray> rays;
     for (std::size_t i = 0; i < effort.rays; ++i) rays.push_back(pairs[i].ray);
 
@@ -390,11 +427,12 @@ void measure_tests(Report& report, const Stream& stream, const std::vector<Conte
       tracers.push_back(one.prepare(stream, mesh, rays));
       work.push_back(tracers.back().trace);
     }
-    const int threads = thread_count();
-    set_thread_count(1);  // a test's time, not a machine's; and another core may be busy
-    const std::vector<Times> times = take_turns(stream, work, report.turns());
-    set_thread_count(threads);
-    for (std::size_t k = 0; k < contestants.size() && times[k].repeats > 0; ++k) {
+    std::vector<Times> times;
+    {
+      const OneThread alone;  // a test's time, not a machine's; and another core may be busy
+      times = take_turns(stream, work, report.turns());
+    }
+    for (std::size_t k = 0; k < contestants.size(); ++k) {
       const Contestant& one = contestants[k];
       Row row;
       row.scene = kind_name;
@@ -403,11 +441,15 @@ void measure_tests(Report& report, const Stream& stream, const std::vector<Conte
       row.settings = one.settings;
       row.settings["bytes_per_triangle"] = one.bytes_per_triangle;
       row.settings["pairs"] = double(pairs.size());
+      if (stream.backend() == Backend::cpu) row.settings["threads"] = 1.0;
       row.time_ms = times[k];
-      row.errors = pair_errors(pairs, truths, one.answer(stream, pairs), one);
-      const Comparison found = compare_hits(mesh, rays, tracers[k].hits(), expected, one, reference);
-      row.errors.push_back({"mismatches", found.mismatches});
-      row.errors.push_back({"ties", found.ties});
+      if (times[k].repeats >= Report::least_repeats) {
+        row.errors = pair_errors(pairs, truths, one.answer(stream, pairs), one);
+        tracers[k].forget();
+        tracers[k].trace();
+        for (Error& error : trace_errors(stream, mesh, rays, tracers[k].hits(), expected, one, reference))
+          row.errors.push_back(std::move(error));
+      }
       row.rays = double(effort.rays);
       row.primitive_tests = double(effort.rays) * double(effort.triangles);
       row.bytes = one.bytes_per_triangle * double(effort.triangles);
@@ -431,32 +473,34 @@ std::vector<Experiment> ray_casting_experiments() {
                 {"settings.scalar", "settings.loop"},
                 false};
   };
-  Experiment tests{
-      "tests",
-      5,
-      {plot("tests_t", "Error of t over the time of a test", "median of a million pairs a panel",
-            "error.t_ulps", "error of t (ulps of a float)"),
-       plot("tests_t_p99", "The last hundredth's error of t over the time of a test",
-            "99th percentile of a million pairs a panel", "error.t_ulps_p99", "error of t (ulps of a float)"),
-       plot("tests_uv", "Error of the barycentrics over the time of a test",
-            "99th percentile of a million pairs a panel", "error.uv_ulps_p99",
-            "error of u and v (units of 2⁻²⁴)"),
-       plot("tests_false", "False hits and misses over the time of a test",
-            "fraction of a million pairs a panel, against exact decisions", "error.false_decisions",
-            "false decisions (fraction)")},
-      [](Report& report) {
-        std::vector<PairKind> kinds;
-        for (int k = 0; k < pair_kinds; ++k) kinds.push_back(static_cast<PairKind>(k));
-        const Contestant reference = contestant<Watertight, double>(TriangleTest::watertight, Loop::blocked);
-        double done = 0;
-        const double all = double(kinds.size() * report.backends().size());
-        for (const Backend backend : report.backends())
-          for (const PairKind kind : kinds) {
-            measure_tests(report, backend, test_contestants(), reference, {kind},
-                          test_effort(backend, report.budget_s()));
-            report.progress(++done / all);
-          }
-      }};
+  Experiment tests{"tests",
+                   5,
+                   {plot("tests_t", "Error of t over the time of a test",
+                         "the median over the pairs of a kind; a kind a panel", "error.t_ulps",
+                         "error of t (ulps of a float)"),
+                    plot("tests_t_p99", "The last hundredth's error of t over the time of a test",
+                         "the 99th percentile over the pairs of a kind; a kind a panel", "error.t_ulps_p99",
+                         "error of t (ulps of a float)"),
+                    plot("tests_uv", "Error of the barycentrics over the time of a test",
+                         "the 99th percentile over the pairs of a kind; a kind a panel", "error.uv_ulps_p99",
+                         "error of u and v (units of 2⁻²⁴)"),
+                    plot("tests_false", "False hits and misses over the time of a test",
+                         "the fraction of the pairs of a kind that are decided wrongly; a kind a panel",
+                         "error.false_decisions", "false decisions (fraction)")},
+                   [](Report& report) {
+                     std::vector<PairKind> kinds;
+                     for (int k = 0; k < pair_kinds; ++k) kinds.push_back(static_cast<PairKind>(k));
+                     const Contestant reference =
+                         contestant<Watertight, double>(TriangleTest::watertight, Loop::blocked);
+                     double done = 0;
+                     const double all = double(kinds.size() * report.backends().size());
+                     for (const PairKind kind : kinds)
+                       for (const Backend backend : report.backends()) {
+                         measure_tests(report, backend, test_contestants(), reference, {kind},
+                                       test_effort(backend, report.budget_s()));
+                         report.progress(++done / all);
+                       }
+                   }};
   Experiment triangles{"triangles",
                        2,
                        {{"triangles",
@@ -474,7 +518,7 @@ std::vector<Experiment> ray_casting_experiments() {
                      3,
                      {{"samples",
                        "Error of an image over time while samples accumulate",
-                       "1 to 64 jittered samples a pixel, against a reference of 1024",
+                       "twice the samples from point to point, against a reference in double precision",
                        {"total_ms", "build and render time (ms)"},
                        {"error.rmse", "RMSE (linear light)"},
                        {"backend"},

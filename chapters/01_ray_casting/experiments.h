@@ -10,9 +10,9 @@
 namespace trilha {
 
 /// Triangles and rays made ready for a test: `trace` finds each ray's nearest hit, `hits` brings them to the
-/// host.
+/// host, `forget` overwrites them.
 struct Tracer {
-  std::function<void()> trace;
+  std::function<void()> trace, forget;
   std::function<std::vector<HitOf<double>>()> hits;
 };
 
@@ -33,16 +33,20 @@ std::vector<Contestant> test_contestants();
 
 /// How much of everything: what two cores do in the report's budget, or a GPU in the same time.
 struct TestEffort {
-  std::size_t pairs;            ///< a kind; 2²⁰ in ten minutes: enough to see one wrong decision in 10⁵
+  std::size_t pairs;            ///< a kind; 2²⁰ in ten minutes
   std::size_t triangles, rays;  ///< of the timed traces
 };
 TestEffort test_effort(Backend backend, double budget_s);
 
-/// Adds a row for every contestant and kind of pair: the time of a test, taken from tracing `rays` rays among
-/// `triangles` triangles of that kind, small enough that few are hit, on the CPU by one thread; and the
-/// errors of t and of the barycentrics, in units of a float's last place, of false hits and of false misses,
-/// against the ground truth on single pairs. So that no time stands without an error, the timed traces are
-/// compared too, with `reference`, hit by hit.
+/// Adds a row for every contestant and kind of pair. Its time is that of a test, taken from tracing `rays`
+/// rays among `triangles` triangles of the pairs, made small so that few are hit; on the CPU by one thread.
+/// Its errors are those of t and of the barycentrics, in units of a float's last place, and of false hits and
+/// misses, against the ground truth on single pairs. So that no time stands without an error, each timed
+/// trace is done once more and compared: `mismatches` are rays that hit where `reference` does not, or the
+/// other way round, or whose t is further from the reference's than both bounds together; `ties`, another
+/// triangle at the same t; `timed_unbounded`, hits that a bound says nothing of; `inconsistent`, hits whose
+/// t, u or v are not, bit for bit, what the contestant answers to that pair alone; `timed_hits`, how many
+/// there were.
 void measure_tests(Report& report, const Stream& stream, const std::vector<Contestant>& contestants,
                    const Contestant& reference, const std::vector<PairKind>& kinds, const TestEffort& effort);
 

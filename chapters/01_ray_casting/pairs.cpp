@@ -48,14 +48,7 @@ std::vector<Answer<T>> answers(const Stream& stream, const std::vector<Pair>& pa
 
 #define INSTANTIATE(Test, T) \
   template std::vector<Answer<T>> answers<Test, T>(const Stream&, const std::vector<Pair>&);
-INSTANTIATE(PlaneBarycentric, float)
-INSTANTIATE(MollerTrumbore, float)
-INSTANTIATE(BaldwinWeber, float)
-INSTANTIATE(Watertight, float)
-INSTANTIATE(PlaneBarycentric, double)
-INSTANTIATE(MollerTrumbore, double)
-INSTANTIATE(BaldwinWeber, double)
-INSTANTIATE(Watertight, double)
+TRILHA_EVERY_TEST_AND_SCALAR(INSTANTIATE)
 #undef INSTANTIATE
 
 }  // namespace trilha

@@ -171,8 +171,13 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
     diffuse_ = Buffer(stream_, diffuse);
   }
   with_test(settings_.test, [&](auto test) {
-    numbers_ = prepare_triangles<decltype(test), float>(stream_, settings_.loop, positions_.data(),
-                                                        triangles_.data(), count_);
+    using Test = decltype(test);
+    if (settings_.scalar == Scalar::single_precision)
+      numbers_ = prepare_triangles<Test, float>(stream_, settings_.loop, positions_.data(), triangles_.data(),
+                                                count_);
+    else
+      wide_numbers_ = prepare_triangles<Test, double>(stream_, settings_.loop, positions_.data(),
+                                                      triangles_.data(), count_);
   });
   stream_.synchronize();
   if (!reads_surface(settings_) && !keep.surface) positions_ = {}, triangles_ = {};
@@ -180,10 +185,42 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
 
 // ---- rendering ---------------------------------------------------------------
 
+namespace {
+
+struct WidenRays {
+  const Ray* rays;
+  RayOf<double>* out;
+  TRILHA_HD void operator()(std::size_t i) const { out[i] = rays[i].as<double>(); }
+};
+
+struct NarrowHits {
+  const HitOf<double>* hits;
+  Hit* out;
+  TRILHA_HD void operator()(std::size_t i) const {
+    const HitOf<double>& h = hits[i];
+    out[i] = {static_cast<float>(h.t), h.primitive, h.instance, static_cast<float>(h.u),
+              static_cast<float>(h.v)};
+  }
+};
+
+}  // namespace
+
 void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
   with_test(settings_.test, [&](auto test) {
-    const Triangles<decltype(test)> triangles{numbers_.data(), count_, settings_.one_sided};
-    trace_triangles(stream_, settings_.loop, triangles, rays, hits, n);
+    using Test = decltype(test);
+    if (settings_.scalar == Scalar::single_precision) {
+      const Triangles<Test> triangles{numbers_.data(), count_, settings_.one_sided};
+      return trace_triangles(stream_, settings_.loop, triangles, rays, hits, n);
+    }
+    if (wide_rays_.size() < n) {
+      wide_rays_ = {}, wide_hits_ = {};  // freed before the new ones are made
+      wide_rays_ = Buffer<RayOf<double>>(stream_.backend(), n);
+      wide_hits_ = Buffer<HitOf<double>>(stream_.backend(), n);
+    }
+    const Triangles<Test, double> triangles{wide_numbers_.data(), count_, settings_.one_sided};
+    for_each(stream_, n, WidenRays{rays, wide_rays_.data()});
+    trace_triangles(stream_, settings_.loop, triangles, wide_rays_.data(), wide_hits_.data(), n);
+    for_each(stream_, n, NarrowHits{wide_hits_.data(), hits});
   });
 }
 

@@ -114,6 +114,7 @@ inline const char* name(TriangleTest test) {
   constexpr const char* names[] = {"plane", "moller-trumbore", "baldwin-weber", "watertight"};
   return names[static_cast<int>(test)];
 }
+enum class Scalar { single_precision, double_precision };
 enum class Loop { plain, blocked };
 enum class Shading { lambert, normals, depth, primitive, barycentrics, facing, tests };
 
@@ -129,6 +130,7 @@ struct Keep {
 
 struct RayCastingSettings {
   TriangleTest test = TriangleTest::watertight;
+  Scalar scalar = Scalar::single_precision;
   Loop loop = Loop::blocked;
   Shading shading = Shading::lambert;
   bool one_sided = false;
@@ -313,6 +315,9 @@ class RayCaster {
   Buffer<std::uint32_t> materials_;
   Buffer<vec3> diffuse_;
   Buffer<float> numbers_;
+  Buffer<double> wide_numbers_;  ///< instead, where the scalar is double
+  mutable Buffer<RayOf<double>> wide_rays_;
+  mutable Buffer<HitOf<double>> wide_hits_;
   Buffer<Ray> rays_;
   Buffer<Hit> hits_;
   StageTimes times_;

@@ -298,6 +298,17 @@ struct Watertight : KeepsVertices {
   }
 };
 
+/// Expands DO(Test, T) for every test and scalar that the chapter compiles: for explicit instantiations.
+#define TRILHA_EVERY_TEST_AND_SCALAR(DO) \
+  DO(PlaneBarycentric, float)            \
+  DO(MollerTrumbore, float)              \
+  DO(BaldwinWeber, float)                \
+  DO(Watertight, float)                  \
+  DO(PlaneBarycentric, double)           \
+  DO(MollerTrumbore, double)             \
+  DO(BaldwinWeber, double)               \
+  DO(Watertight, double)
+
 /// The whole test of one triangle: true, and the solution, if the ray meets it at t in [ray.t_min,
 /// ray.t_max).
 template <class Test, class T, class Constants>

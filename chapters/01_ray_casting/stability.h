@@ -9,9 +9,10 @@ namespace trilha {
 
 /// What became of a ray. `lost`: the nearest surface was not reported, or one behind it was; `phantom`: a hit
 /// where there is none, or before the nearest; `off`: the right triangle, but t off by more than a hundredth
-/// of the way, or of the triangle where that is longer. `forbidden` is what no test may ever answer: a hit on
-/// a triangle that is not finite, t outside the ray's interval, or further from the exact t on its triangle
-/// than the bound that the test claims.
+/// of the way, or of the triangle where that is longer. Another triangle whose t is within a hundredth counts
+/// as the right one: the ray passes near their common border. `forbidden` is what no test may ever answer: a
+/// hit on a triangle that is not finite, t outside the ray's interval, or further from the exact t on its
+/// triangle than the bound that the test claims.
 enum class Outcome : std::uint8_t { hit, miss, lost, phantom, off, forbidden };
 
 struct Verdict {

@@ -65,14 +65,7 @@ void trace_blocks(const Triangles<Test, T>& triangles, const RayOf<T>* rays, Hit
 
 #define INSTANTIATE(Test, T) \
   template void trace_blocks(const Triangles<Test, T>&, const RayOf<T>*, HitOf<T>*, std::size_t);
-INSTANTIATE(PlaneBarycentric, float)
-INSTANTIATE(MollerTrumbore, float)
-INSTANTIATE(BaldwinWeber, float)
-INSTANTIATE(Watertight, float)
-INSTANTIATE(PlaneBarycentric, double)
-INSTANTIATE(MollerTrumbore, double)
-INSTANTIATE(BaldwinWeber, double)
-INSTANTIATE(Watertight, double)
+TRILHA_EVERY_TEST_AND_SCALAR(INSTANTIATE)
 #undef INSTANTIATE
 
 }  // namespace trilha

@@ -69,18 +69,17 @@ Truth true_intersection(const vec3& a, const vec3& b, const vec3& c, const Ray& 
     return {false, true, 0, 0, 0};
   const RayOf<Wide> wide = ray.as<Wide>();
   const auto edges = error_bounds::watertight_edges<Wide>(a, b, c, wide);
-  bool sure = true;
-  for (int i = 0; i < 3; ++i) sure = sure && std::fabs(edges.value[i]) > edges.error[i];
+  bool sure = true, positive = false, negative = false;
+  for (int i = 0; i < 3; ++i) {
+    sure = sure && std::fabs(edges.value[i]) > edges.error[i];
+    positive = positive || edges.value[i] > edges.error[i];
+    negative = negative || edges.value[i] < -edges.error[i];
+  }
+  if (positive && negative) return {false, true, 0, 0, 0};  // surely beside it
   Solution<Wide> s{};
   const bool hit = intersect<Watertight>(Vec3<Wide>(a), Vec3<Wide>(b), Vec3<Wide>(c), wide, s);
-  if (!hit && !sure) {  // surely beside it if two edge functions that are sure disagree
-    bool positive = false, negative = false;
-    for (int i = 0; i < 3; ++i) {
-      positive = positive || edges.value[i] > edges.error[i];
-      negative = negative || edges.value[i] < -edges.error[i];
-    }
-    sure = positive && negative;
-  }
+  const auto t_error = t_error_bound<Watertight>(a, b, c, wide, s.t);
+  if (std::fabs(s.t - wide.t_min) <= t_error || std::fabs(s.t - wide.t_max) <= t_error) sure = false;
   return {hit, sure, s.t, s.u, s.v};
 }
 

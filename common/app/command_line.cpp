@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <set>
 #include <vector>
 
 #include "common/error.h"
@@ -147,6 +148,15 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
     throw UsageError(std::string(error.what()) + " (--help lists the flags)");
   }
 
+  const bool fixed_scenes = options.stability || (!options.report.empty() && options.sweeps.empty());
+  static const std::set<std::string> have_a_part{"--backend", "--headless", "--seed",          "--threads",
+                                                 "--config",  "--report",   "--report-budget", "--stability",
+                                                 "--json",    "--quiet"};
+  for (const CLI::Option* option : app.get_options())
+    if (fixed_scenes && option->count() > 0 && have_a_part.count(option->get_name()) == 0)
+      throw UsageError(option->get_name() + " has no part in " +
+                       (options.stability ? "--stability" : "--report") +
+                       ", which brings its own scenes and settings; leave it out");
   if (backend == "cpu") options.backend = Backend::cpu;
   if (backend == "cuda") options.backend = Backend::cuda;
   if (!options.backend && backend != "auto")

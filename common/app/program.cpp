@@ -272,6 +272,8 @@ void run_report(Demo& demo, const Settings& settings, const Options& options,
   } else {
     std::vector<Sweep> sweeps;
     for (const std::string& text : options.sweeps) sweeps.push_back(Sweep::parse(text, settings));
+    if (sweeps.size() == 2 && sweeps[0].name == sweeps[1].name)
+      throw UsageError("--sweep: " + sweeps[0].name + " is named twice; give its values in one list");
     const Scene scene = load(options);
     for (const std::string& warning : scene.warnings) warn(warning);
     report.run({sweep_experiment(sweeps, settings, scene, choose_backend(options), options.width,

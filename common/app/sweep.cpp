@@ -36,9 +36,7 @@ std::unique_ptr<Variant> make_variant(const std::vector<Sweep>& sweeps, std::siz
       variant->swept[setting.name] = setting.text();
   }
   const auto before = static_cast<double>(live_bytes(stream.backend()));
-  Timer timer(stream);
-  variant->demo->build(scene, stream);
-  variant->build_ms = timer.milliseconds();
+  variant->build_ms = take_turns(stream, {[&] { variant->demo->build(scene, stream); }}, {5, 0})[0].median;
   variant->bytes = static_cast<double>(live_bytes(stream.backend())) - before;
   return variant;
 }
@@ -49,8 +47,10 @@ Renderer renderer_of(Variant& variant, const Scene& scene, const Stream& stream)
   renderer.settings = variant.swept;
   renderer.build_ms = variant.build_ms;
   renderer.bytes = variant.bytes;
-  renderer.add_sample = [&variant, &scene](Film& film, std::uint32_t index, std::uint64_t seed) {
-    variant.demo->add_sample(film, {scene.camera, index, true, seed, 400, [](double) { return true; }});
+  renderer.add_sample = [&variant, &scene](Film& film, std::uint32_t index, std::uint64_t seed,
+                                           const KeepGoing& keep_going) {
+    return variant.demo->add_sample(
+        film, {scene.camera, index, true, seed, 400, [&](double) { return keep_going(); }});
   };
   renderer.develop = [&variant, stream](const Film& film) { return variant.demo->develop(film, stream); };
   return renderer;
@@ -77,7 +77,11 @@ Sweep Sweep::parse(const std::string& text, const Settings& settings) {
     throw UsageError(refused + "names no setting; there are: " + names);
   }
   const std::string now = found->text();
-  for (const std::string& value : sweep.values) found->set_text(value);  // throws for what is none
+  for (auto value = sweep.values.begin(); value != sweep.values.end(); ++value) {
+    found->set_text(*value);  // throws for what is none
+    if (std::find(sweep.values.begin(), value, *value) != value)
+      throw UsageError(refused + "names '" + *value + "' twice");
+  }
   found->set_text(now);
   return sweep;
 }
@@ -109,6 +113,7 @@ Experiment sweep_experiment(const std::vector<Sweep>& sweeps, const Settings& ba
       renderers.push_back(renderer_of(*variants.back(), scene, stream));
     }
     const auto reference = make_variant({}, 0, base, scene, stream, make);
+    reference->technique = "the settings as they were";
     Accumulation what;
     what.scene = scene.name;
     what.width = width;

@@ -62,15 +62,16 @@ inline Estimate proportion(double k, double n) {
   return {p, std::max(0.0, k > 0 ? middle - half : 0.0), std::min(1.0, k < n ? middle + half : 1.0)};
 }
 
-/// The median of independent values with its interval: the order statistics that hold it with 95 %
-/// confidence by the binomial distribution, in its normal approximation (David & Nagaraja 2003, 7.1).
-inline Estimate median_estimate(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const auto n = static_cast<double>(values.size());
-  const double half = z95 * std::sqrt(n) / 2;
-  const auto at = [&](double rank) { return values[static_cast<std::size_t>(std::clamp(rank, 0.0, n - 1))]; };
-  if (values.empty()) return {quantile(values, 0.5)};
-  return {quantile(values, 0.5), at(std::floor(n / 2 - half)), at(std::ceil(n / 2 + half))};
+/// The p-quantile of independent values that are sorted, with its interval: the order statistics that hold it
+/// with 95 % confidence by the binomial distribution, in its normal approximation (David & Nagaraja
+/// 2003, 7.1). Where so few values have no such order statistic the interval is unbounded.
+inline Estimate quantile_estimate(const std::vector<double>& sorted, double p) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const auto n = static_cast<double>(sorted.size());
+  const double half = z95 * std::sqrt(n * p * (1 - p));
+  const double low = std::floor(n * p - half), high = std::ceil(n * p + half);
+  return {quantile(sorted, p), low < 0 ? -infinity : sorted[static_cast<std::size_t>(low)],
+          high > n - 1 ? infinity : sorted[static_cast<std::size_t>(high)]};
 }
 
 }  // namespace trilha

@@ -112,11 +112,11 @@ void Report::run(const std::vector<Experiment>& experiments) {
   shares_all_ = 0;
   for (const Experiment& experiment : experiments) shares_all_ += experiment.share;
   for (const Experiment& experiment : experiments) {
+    running_ = experiment.name;
     if (options_.stopped()) {
-      leave_out(experiment.name + ": stopped by request");
+      leave_out("all of it");
       continue;
     }
-    running_ = experiment.name;
     shares_now_ = experiment.share;
     begin_ = elapsed_s();
     deadline_ = begin_ + (options_.budget_s - begin_) * shares_now_ / (shares_all_ - shares_done_);
@@ -126,20 +126,26 @@ void Report::run(const std::vector<Experiment>& experiments) {
 }
 
 void Report::progress(double fraction) {
-  if (options_.progress) options_.progress((shares_done_ + shares_now_ * fraction) / shares_all_, running_);
+  furthest_ = std::max(furthest_, (shares_done_ + shares_now_ * fraction) / shares_all_);
+  if (options_.progress) options_.progress(furthest_, running_);
 }
 
 void Report::add(Row row) {
   row.experiment = running_;
+  if (row.time_ms.repeats < least_repeats) {
+    std::string what = row.scene + ", " + name(row.backend) + ", " + row.technique;
+    for (const auto& [name, value] : row.settings) what += ", " + name + " " + setting_text(value);
+    return leave_out(what);
+  }
   if (row.errors.empty())
     throw std::logic_error("a row of " + running_ + " about " + row.technique + " has no error");
-  if (row.time_ms.repeats < 5)
-    return leave_out(running_ + ": " + row.technique + " on " + row.scene + ", " + name(row.backend) +
-                     ": the time was up");
   rows_.push_back(std::move(row));
 }
 
-void Report::leave_out(const std::string& what) { left_out_.push_back(what); }
+void Report::leave_out(const std::string& what) {
+  left_out_.push_back(running_ + ": " + what + ": " +
+                      (options_.stopped() ? "stopped by request" : "the time was up"));
+}
 
 std::string Report::json() const {
   Json plots = Json::array(), rows = Json::array();
@@ -188,7 +194,8 @@ std::string Report::csv() const {
   out << ",time_ms.median,time_ms.q1,time_ms.q3,time_ms.repeats,error.kind";
   for (const std::string& kind : kinds)
     for (const char* part : {"", ".low", ".high"}) out << "," << field("error." + kind + part);
-  out << ",build_ms,rays,mrays_per_s,node_visits,primitive_tests,bytes\n";
+  out << ",build_ms,rays,mrays_per_s,node_visits,primitive_tests,bytes,published.time_ms,published.by,"
+         "published.hardware\n";
   const auto cell = [&](const std::optional<double>& x) {
     out << ",";
     if (x) out << *x;
@@ -218,7 +225,9 @@ std::string Report::csv() const {
     cell(row.node_visits);
     cell(row.primitive_tests);
     cell(row.bytes);
-    out << "\n";
+    cell(row.published ? std::optional(row.published->time_ms) : std::nullopt);
+    const Published published = row.published.value_or(Published{});
+    out << "," << field(published.by) << "," << field(published.hardware) << "\n";
   }
   return out.str();
 }

@@ -108,8 +108,10 @@ class Report {
   /// Adds a row to the running experiment. A row that was stopped before its fifth repeat is left out, and
   /// that is said. Throws std::logic_error for a row without an error.
   void add(Row row);
-  /// Says in the report, and on the terminal, what is not in it.
+  /// Says in the report what of the running experiment is not in it, and why.
   void leave_out(const std::string& what);
+
+  static constexpr int least_repeats = 5;
 
   const std::vector<Row>& rows() const { return rows_; }
   const std::vector<std::string>& left_out() const { return left_out_; }
@@ -126,6 +128,7 @@ class Report {
   std::vector<std::string> left_out_;
   std::string running_;
   double deadline_ = 0;  ///< of the running experiment, in seconds since the start
+  double furthest_ = 0;  ///< progress never goes back
   double begin_ = 0, shares_done_ = 0, shares_now_ = 0, shares_all_ = 1;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 

@@ -52,6 +52,13 @@ std::vector<const StabilityRow*> StabilityTable::unexcused() const {
   return found;
 }
 
+bool StabilityTable::has_picture(const StabilityRow& row) const {
+  return !row.picture.pixels.empty() &&
+         std::any_of(rows_.begin(), rows_.end(), [&](const StabilityRow& other) {
+           return other.case_name == row.case_name && other.failures > 0;
+         });
+}
+
 void StabilityTable::print(std::ostream& out) const {
   std::vector<std::string> techniques;
   std::map<std::pair<std::string, std::string>, std::size_t> lines;
@@ -89,7 +96,7 @@ std::string StabilityTable::json(const std::string& chapter) const {
                     {"worst", {{"value", row.worst ? Json(*row.worst) : Json()}, {"unit", row.unit}}},
                     {"by_nature", !row.why.empty()}});
     if (!row.why.empty()) rows.back()["why"] = row.why;
-    if (!row.picture.pixels.empty()) rows.back()["picture"] = picture_path(row);
+    if (has_picture(row)) rows.back()["picture"] = picture_path(row);
   }
   const bool cuda = why_unavailable(Backend::cuda).empty();
   const Json all = {
@@ -105,7 +112,7 @@ void StabilityTable::write(const std::string& folder, const std::string& chapter
   make_folder(folder + "/pictures");
   write_whole_file(folder + "/stability.json", json(chapter));
   for (const StabilityRow& row : rows_)
-    if (!row.picture.pixels.empty()) write_image(folder + "/" + picture_path(row), row.picture);
+    if (has_picture(row)) write_image(folder + "/" + picture_path(row), row.picture);
 }
 
 }  // namespace trilha

@@ -48,6 +48,9 @@ class StabilityTable {
   void write(const std::string& folder, const std::string& chapter) const;
 
  private:
+  /// Is there one to write: does any technique fail the row's case?
+  bool has_picture(const StabilityRow& row) const;
+
   std::vector<StabilityRow> rows_;
 };
 

@@ -19,15 +19,15 @@ Times summary(const std::vector<double>& ms);
 /// How pieces of work are timed against each other.
 struct Turns {
   int repeats = 7;       ///< measurements of each piece
-  double least_ms = 10;  ///< a measurement runs the work again and again until it has taken so long
+  double least_ms = 10;  ///< a measurement is as many runs as take about so long, by the warm-up
   /// Asked before each measurement; false ends the turns early.
   std::function<bool()> keep_going = [] { return true; };
 };
 
-/// The time of one run of each piece of work on the stream. Every piece is run once to warm up, which shows
-/// how many runs make a measurement; then they take turns, so that whatever slows the machine for a while
-/// slows all of them, and each turn starts one piece further. Device work is timed by events. Fewer repeats
-/// than asked for mean that it was stopped.
+/// The time of one run of each piece of work on the stream. Every piece is run twice to warm up; the second
+/// shows how many runs make a measurement. Then they take turns, so that whatever slows the machine for a
+/// while slows all of them, and each turn starts one piece further. Device work is timed by events. Fewer
+/// repeats than asked for mean that it was stopped.
 std::vector<Times> take_turns(const Stream& stream, const std::vector<std::function<void()>>& work,
                               const Turns& turns = {});
 
