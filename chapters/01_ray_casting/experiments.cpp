@@ -253,7 +253,7 @@ Entry build_caster(const Scene& scene, const RayCastingSettings& settings, const
     entry.caster.reset();
     entry.caster = std::make_unique<RayCaster>(scene, settings, stream);
   };
-  entry.build_ms = take_turns(stream, {build}, {5, 0})[0].median;
+  entry.build_ms = take_turns(stream, {build}, {.repeats = 5, .least_ms = 0})[0].median;
   entry.bytes = static_cast<double>(live_bytes(stream.backend())) - before;
   return entry;
 }
@@ -298,7 +298,7 @@ void measure_triangles(Report& report) {
           caster->add_sample(film, scene.camera, 0, false, 0, 400, [](double) { return true; });
         });
       }
-      const std::vector<Times> times = take_turns(stream, work, report.turns());
+      const std::vector<Times> times = take_turns(stream, work, report.turns(0.25));
       const Buffer<Ray> rays_there(stream, rays);
       Buffer<Hit> hits_there(backend, rays.size());
       for (std::size_t k = 0; k < entries.size(); ++k) {
@@ -402,8 +402,8 @@ TestEffort test_effort(Backend backend, double budget_s) {
 }
 
 void measure_tests(Report& report, const Stream& stream, const std::vector<Contestant>& contestants,
-                   const Contestant& reference, const std::vector<PairKind>& kinds,
-                   const TestEffort& effort) {
+                   const Contestant& reference, const std::vector<PairKind>& kinds, const TestEffort& effort,
+                   double part) {
   for (const PairKind kind : kinds) {
     const std::string kind_name = pair_kind_texts[static_cast<int>(kind)].name;
     if (!report.keep_going()) {
@@ -430,7 +430,7 @@ void measure_tests(Report& report, const Stream& stream, const std::vector<Conte
     std::vector<Times> times;
     {
       const OneThread alone;  // a test's time, not a machine's; and another core may be busy
-      times = take_turns(stream, work, report.turns());
+      times = take_turns(stream, work, report.turns(part));
     }
     for (std::size_t k = 0; k < contestants.size(); ++k) {
       const Contestant& one = contestants[k];
@@ -497,7 +497,7 @@ std::vector<Experiment> ray_casting_experiments() {
                      for (const PairKind kind : kinds)
                        for (const Backend backend : report.backends()) {
                          measure_tests(report, backend, test_contestants(), reference, {kind},
-                                       test_effort(backend, report.budget_s()));
+                                       test_effort(backend, report.budget_s()), 0.5 / (all - done));
                          report.progress(++done / all);
                        }
                    }};

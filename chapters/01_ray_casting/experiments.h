@@ -46,9 +46,10 @@ TestEffort test_effort(Backend backend, double budget_s);
 /// other way round, or whose t is further from the reference's than both bounds together; `ties`, another
 /// triangle at the same t; `timed_unbounded`, hits that a bound says nothing of; `inconsistent`, hits whose
 /// t, u or v are not, bit for bit, what the contestant answers to that pair alone; `timed_hits`, how many
-/// there were.
+/// there were. The turns of a kind may take `part` of the time that the experiment has left.
 void measure_tests(Report& report, const Stream& stream, const std::vector<Contestant>& contestants,
-                   const Contestant& reference, const std::vector<PairKind>& kinds, const TestEffort& effort);
+                   const Contestant& reference, const std::vector<PairKind>& kinds, const TestEffort& effort,
+                   double part = 1);
 
 /// All experiments of the chapter.
 std::vector<Experiment> ray_casting_experiments();

@@ -36,7 +36,9 @@ std::unique_ptr<Variant> make_variant(const std::vector<Sweep>& sweeps, std::siz
       variant->swept[setting.name] = setting.text();
   }
   const auto before = static_cast<double>(live_bytes(stream.backend()));
-  variant->build_ms = take_turns(stream, {[&] { variant->demo->build(scene, stream); }}, {5, 0})[0].median;
+  variant->build_ms =
+      take_turns(stream, {[&] { variant->demo->build(scene, stream); }}, {.repeats = 5, .least_ms = 0})[0]
+          .median;
   variant->bytes = static_cast<double>(live_bytes(stream.backend())) - before;
   return variant;
 }

@@ -30,7 +30,7 @@ struct Accumulation {
   /// For all of it. The reference may take half; where its samples, or those of the lines, would take longer,
   /// there are fewer, and that is said.
   double seconds = 60;
-  int repeats = 5;
+  int repeats = 9;
 };
 
 /// Lets the renderers take turns, each with a film of its own, and adds rows for 1, 2, 4, … and `samples`

@@ -98,9 +98,12 @@ class Report {
   /// Seconds left to the running experiment, and whether it may go on.
   double left_s() const;
   bool keep_going() const { return left_s() > 0 && !options_.stopped(); }
-  /// The default way to take turns: until the time is up.
-  Turns turns() const {
-    return {7, 10, [this] { return keep_going(); }};
+  /// How to take turns so that they need no more than that part of the time that is left, or five repeats.
+  Turns turns(double part) const {
+    Turns turns;
+    turns.most_ms = 1000 * left_s() * part;
+    turns.keep_going = [this] { return keep_going(); };
+    return turns;
   }
   /// Tells how far the running experiment is.
   void progress(double fraction);

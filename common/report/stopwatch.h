@@ -18,8 +18,10 @@ Times summary(const std::vector<double>& ms);
 
 /// How pieces of work are timed against each other.
 struct Turns {
-  int repeats = 7;       ///< measurements of each piece
+  int repeats = 21;      ///< measurements of each piece
   double least_ms = 10;  ///< a measurement is as many runs as take about so long, by the warm-up
+  /// After the fifth repeat no turn begins once the turns have taken so long.
+  double most_ms = 1e300;
   /// Asked before each measurement; false ends the turns early.
   std::function<bool()> keep_going = [] { return true; };
 };
