@@ -81,6 +81,32 @@ TEST_CASE("the ground truth is what rational arithmetic says") {
   CHECK(worst > 0.02);
 }
 
+// Catches: a bound that forgets underflow: where t is subnormal its last rounding is no relative one.
+TEST_CASE("bounds hold where t is subnormal") {
+  const std::vector<Contestant> contestants = test_contestants();
+  std::size_t compared = 0;
+  for (int i = 0; i < 20000; ++i) {
+    Random random(22, static_cast<std::uint64_t>(i));
+    Pair p = make_pair(random, PairKind::random);
+    for (vec3* v : {&p.a, &p.b, &p.c, &p.ray.origin}) *v *= 1e-20f;
+    p.ray.direction *= 1e20f;  // t is about 1e-40
+    const Truth truth = true_intersection(p.a, p.b, p.c, p.ray);
+    for (const Contestant& one : contestants) {
+      if (std::get<std::string>(one.settings.at("scalar")) != "float") continue;
+      if (std::get<std::string>(one.settings.at("loop")) != "plain") continue;
+      const Answer<double> answer = one.answer(Backend::cpu, {p})[0];
+      if (answer.hit == 0 || !truth.hit) continue;
+      const double bound = one.bound(p.a, p.b, p.c, p.ray, answer.t);
+      if (!(bound < error_bounds::infinity)) continue;
+      ++compared;
+      const auto error = static_cast<double>(std::fabs(answer.t - truth.t));
+      if (!(error <= bound))
+        FAIL_CHECK(one.technique << " pair " << i << ": error " << error << " bound " << bound);
+    }
+  }
+  CHECK(compared > 5000);
+}
+
 // Catches: a report that would not show what is wrong with a technique: t a little off, a hit dropped now and
 // then, work skipped for speed.
 TEST_CASE("the report shows what is planted in a test") {

@@ -1,45 +1,26 @@
 // compare_images, seen from outside: exit codes, one line, what it prints.
 
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "common/image/files.h"
 #include "common/image/measures.h"
+#include "tests/program.h"
 #include "tests/testing.h"
 
 using namespace trilha;
+using namespace trilha::testing;
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 namespace {
 
-struct Result {
-  int code;
-  std::string out, err;
-};
-
-std::string contents(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-/// A folder that is gone afterwards, with a space in its name, and images in it.
-struct Folder {
-  fs::path path = fs::temp_directory_path() / ("trilha compare " + std::to_string(getpid()));
+/// A folder with two images in it.
+struct Pair : Folder {
   Image a{40, 30, Encoding::display, {}}, b = a;
-  Folder() {
-    fs::remove_all(path);
-    fs::create_directories(path);
+  Pair() {
     for (int i = 0; i < 1200; ++i) {
       a.pixels.push_back(vec3(i % 40, i / 40, i % 7) / 51.0f);
       b.pixels.push_back(a.pixels.back() + vec3(i % 3) / 255.0f);
@@ -47,33 +28,10 @@ struct Folder {
     write_image(*this / "a.png", a);
     write_image(*this / "b.png", b);
   }
-  ~Folder() { fs::remove_all(path); }
-  std::string operator/(const std::string& name) const { return (path / name).string(); }
-  std::size_t files() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), {}));
-  }
 };
 
 Result run(const Folder& folder, const std::string& arguments) {
-  const fs::path out = fs::temp_directory_path() / ("trilha_compare_out" + std::to_string(getpid()));
-  const fs::path err = fs::temp_directory_path() / ("trilha_compare_err" + std::to_string(getpid()));
-  const std::string command = "cd '" + folder.path.string() + "' && exec '" TRILHA_COMPARE "' " + arguments +
-                              " >" + out.string() + " 2>" + err.string();
-  const pid_t child = fork();
-  if (child == 0) {
-    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
-    _exit(127);
-  }
-  int status = 0;
-  waitpid(child, &status, 0);
-  Result result{WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), contents(out), contents(err)};
-  fs::remove(out);
-  fs::remove(err);
-  return result;
-}
-
-std::size_t lines(const std::string& text) {
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  return run(TRILHA_COMPARE, folder, arguments);
 }
 
 double number(const Json& json) {
@@ -87,7 +45,7 @@ double number(const Json& json) {
 // Catches: a refusal without a reason, in more than a line, with the wrong code, or that leaves a file
 // behind.
 TEST_CASE("compare_images refuses in one line, with its exit code") {
-  Folder folder;
+  Pair folder;
   write_image(folder / "small.png", {1, 1, Encoding::display, {vec3(0)}});
   std::ofstream(folder / "text.png") << "no image";
   std::ofstream(folder / "empty.png");
@@ -131,7 +89,7 @@ TEST_CASE("compare_images refuses in one line, with its exit code") {
 
 // Catches: names that tools rely on, going missing; a value that is not the measure's; infinity as null.
 TEST_CASE("the JSON of compare_images holds every measure") {
-  Folder folder;
+  Pair folder;
   const Result result = run(folder, "a.png b.png --json --difference d.png --ppd 30");
   INFO(result.err);
   REQUIRE(result.code == 0);
@@ -166,7 +124,7 @@ TEST_CASE("the JSON of compare_images holds every measure") {
 // Catches: a tone map or an exposure that does not reach the measures; pixels that are not finite passed
 // over.
 TEST_CASE("compare_images maps light to a screen as it is told, and says what it leaves out") {
-  Folder folder;
+  Pair folder;
   Image a = as_light(folder.a), b = as_light(folder.b);
   a.pixels[7] = vec3(std::numeric_limits<float>::quiet_NaN());
   write_image(folder / "a.exr", a);

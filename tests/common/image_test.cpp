@@ -24,9 +24,11 @@
 #include "common/image/plane.h"
 #include "common/image/tone_map.h"
 #include "common/math/random.h"
+#include "tests/program.h"
 #include "tests/testing.h"
 
 using namespace trilha;
+using namespace trilha::testing;
 namespace fs = std::filesystem;
 
 namespace {
@@ -104,27 +106,6 @@ Image noisy_blocks() {
 }
 
 // ---- files ----
-
-struct Folder {
-  fs::path path = fs::temp_directory_path() / ("trilha image " + std::to_string(getpid()));
-  Folder() {
-    fs::remove_all(path);
-    fs::create_directories(path);
-  }
-  ~Folder() { fs::remove_all(path); }
-  std::string operator/(const std::string& name) const { return (path / name).string(); }
-};
-
-std::string contents(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-void write(const std::string& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary) << bytes;
-}
 
 std::string big_endian(std::uint32_t value) {
   std::string bytes;

@@ -1,86 +1,26 @@
 // The contract that every chapter's program keeps, seen from outside: exit codes, one line, nothing
 // half-written.
 
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <chrono>
-#include <csignal>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
+#include "tests/program.h"
 #include "tests/testing.h"
 
+using namespace trilha::testing;
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 namespace {
-
-struct Result {
-  int code;
-  std::string out, err;
-};
-
-std::string contents(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-/// A folder that is gone afterwards, with a space in its name.
-struct Folder {
-  fs::path path = fs::temp_directory_path() / ("trilha program " + std::to_string(getpid()));
-  Folder() {
-    fs::remove_all(path);
-    fs::create_directories(path);
-  }
-  ~Folder() { fs::remove_all(path); }
-  fs::path operator/(const std::string& name) const { return path / name; }
-  std::size_t files() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), {}));
-  }
-};
 
 std::string program() {
   const char* other = std::getenv("TRILHA_PROGRAM");
   return other ? other : TRILHA_PROGRAM;
 }
 
-/// Runs the program in the folder; {} in the arguments stands for the folder. A signal may be sent after a
-/// while.
-Result run(const Folder& folder, std::string arguments, double interrupt_after = -1) {
-  for (std::size_t at; (at = arguments.find("{}")) != std::string::npos;)
-    arguments.replace(at, 2, "'" + folder.path.string() + "'");
-  const fs::path out = fs::temp_directory_path() / ("trilha_out" + std::to_string(getpid()));
-  const fs::path err = fs::temp_directory_path() / ("trilha_err" + std::to_string(getpid()));
-  const std::string command = "cd '" + folder.path.string() + "' && exec '" + program() + "' " + arguments +
-                              " >" + out.string() + " 2>" + err.string();
-  const pid_t child = fork();
-  if (child == 0) {
-    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
-    _exit(127);
-  }
-  if (interrupt_after >= 0) {
-    usleep(static_cast<useconds_t>(interrupt_after * 1e6));
-    kill(child, SIGINT);
-  }
-  int status = 0;
-  waitpid(child, &status, 0);
-  Result result{WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), contents(out), contents(err)};
-  fs::remove(out);
-  fs::remove(err);
-  return result;
+Result run(const Folder& folder, const std::string& arguments, double interrupt_after = -1) {
+  return run(program(), folder, arguments, interrupt_after);
 }
-
-std::size_t lines(const std::string& text) {
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-}
-
-void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 
 const char* const triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -126,7 +66,7 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
       {"--scene good.obj --eye 0,0,0 --target 0,0,0", 1, "eye"},
       {"--scene good.obj --output nowhere/image.png", 1, "nowhere/image.png"},
       {"--scene good.obj --output image.bmp", 1, ".bmp"},
-      {"--scene good.obj --output {}", 1, "trilha program"},
+      {"--scene good.obj --output {}", 1, "trilha test"},
       {"--scene good.obj --output folder.obj", 1, "folder.obj"},
       {"--scene good.obj --output $(printf %0300d 1)", 1, "cannot be written"},
       {"--scene good.obj --output /dev/full", 1, "No space left"},
@@ -290,7 +230,7 @@ TEST_CASE("a report keeps its budget and says what it left out") {
   INFO(result.err);
   REQUIRE(result.code == 0);
   CHECK(seconds < 90);  // sanitizers are slow to reach the next look at the clock
-  const Json json = Json::parse(contents(folder / "r" / "report.json"));
+  const Json json = Json::parse(contents(folder.path / "r" / "report.json"));
   CHECK(json["budget_s"] == 4);
   CHECK(json["left_out"].size() > 0);
   CHECK(result.err.find("not in the report") != std::string::npos);
@@ -300,7 +240,7 @@ TEST_CASE("a report keeps its budget and says what it left out") {
     CHECK(row["time_ms"]["repeats"] >= 5);
     CHECK(row["time_ms"]["median"] > 0);
   }
-  CHECK(fs::exists(folder / "r" / "report.csv"));
+  CHECK(fs::exists(folder.path / "r" / "report.csv"));
 }
 
 // Catches: a sweep that does not change the setting, that changes another, or whose error is not the
@@ -336,8 +276,8 @@ TEST_CASE("the stability table goes to the terminal and to files") {
   REQUIRE(result.code == 0);
   CHECK(result.out.find("watertight") != std::string::npos);
   CHECK(result.out.find("(!)") == std::string::npos);
-  const Json json = Json::parse(contents(folder / "s" / "stability.json"));
+  const Json json = Json::parse(contents(folder.path / "s" / "stability.json"));
   CHECK(json["rows"].size() >= 16 * 4);
   for (const Json& row : json["rows"])
-    CHECK((row["failures"] == 0 || fs::exists(folder / "s" / row["picture"].get<std::string>())));
+    CHECK((row["failures"] == 0 || fs::exists(folder.path / "s" / row["picture"].get<std::string>())));
 }

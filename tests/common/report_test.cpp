@@ -13,6 +13,7 @@
 #include "common/math/random.h"
 #include "common/report/accumulate.h"
 #include "common/report/stability.h"
+#include "tests/program.h"
 #include "tests/testing.h"
 
 using namespace trilha;
@@ -44,17 +45,6 @@ void spin(double ms) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double, std::milli>(ms);
   while (std::chrono::steady_clock::now() < end) {
   }
-}
-
-struct Folder {
-  fs::path path = fs::temp_directory_path() / ("trilha report " + std::to_string(getpid()));
-  ~Folder() { fs::remove_all(path); }
-};
-
-std::string contents(const fs::path& path) {
-  std::ostringstream text;
-  text << std::ifstream(path, std::ios::binary).rdbuf();
-  return text.str();
 }
 
 }  // namespace
