@@ -15,16 +15,20 @@ if(CCACHE)
 endif()
 
 # Rule 6: nothing is fused but what the code fuses. The last two flags change no result: they let loops vectorise.
-set(TRILHA_CXX_FLAGS -ffp-contract=off -fno-math-errno -fno-trapping-math -Wall -Wextra
-    -Wno-restrict)  # GCC 12 warns of its own std::string (its bug 105329)
+set(TRILHA_CXX_FLAGS -ffp-contract=off -fno-math-errno -fno-trapping-math -Wall -Wextra)
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  list(APPEND TRILHA_CXX_FLAGS -Wno-restrict)  # GCC 12 warns of its own std::string (its bug 105329)
+endif()
 if(TRILHA_NATIVE)
   list(APPEND TRILHA_CXX_FLAGS -march=native)
 elseif(TRILHA_CPU_FLAGS)
   list(APPEND TRILHA_CXX_FLAGS ${TRILHA_CPU_FLAGS})
 endif()
 if(TRILHA_SANITIZE)
-  list(APPEND TRILHA_CXX_FLAGS -fsanitize=${TRILHA_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer
-       -Wno-maybe-uninitialized)  # GCC 12 warns of its own std::function under sanitizers
+  list(APPEND TRILHA_CXX_FLAGS -fsanitize=${TRILHA_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    list(APPEND TRILHA_CXX_FLAGS -Wno-maybe-uninitialized)  # GCC 12 warns of its own std::function under sanitizers
+  endif()
   set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g1")
   add_link_options(-fsanitize=${TRILHA_SANITIZE})
 endif()

@@ -7,6 +7,7 @@
 #include "common/error.h"
 #include "common/parallel/bands.h"
 #include "common/parallel/for_each.h"
+#include "common/scene/flatten.h"
 
 namespace trilha {
 
@@ -108,58 +109,18 @@ TRILHA_HD vec3 Shade<reads>::colour(const Ray& ray, const Hit& hit) const {
   return vec3(0);
 }
 
-namespace {
-
 // ---- building ----------------------------------------------------------------
-
-/// All meshes of a scene as one, with only those parts that are asked for.
-struct Parts {
-  bool normals, texture_coordinates, materials;
-};
-Mesh united_mesh(const Scene& scene, const Parts& parts) {
-  Mesh all;
-  all.positions.reserve(scene.vertex_count());
-  all.triangles.reserve(scene.triangle_count());
-  for (const Mesh& mesh : scene.meshes) {
-    const auto offset = static_cast<std::uint32_t>(all.positions.size());
-    all.positions.insert(all.positions.end(), mesh.positions.begin(), mesh.positions.end());
-    for (const uvec3& t : mesh.triangles) all.triangles.push_back(t + offset);
-    if (parts.normals) {
-      Mesh made;
-      if (mesh.normals.empty()) {
-        made = {"", mesh.positions, mesh.triangles, {}, {}, {}};
-        make_normals(made);
-      }
-      const auto& normals = mesh.normals.empty() ? made.normals : mesh.normals;
-      all.normals.insert(all.normals.end(), normals.begin(), normals.end());
-    }
-    if (parts.texture_coordinates) {
-      const auto& uvs = mesh.texture_coordinates;
-      all.texture_coordinates.insert(all.texture_coordinates.end(), uvs.begin(), uvs.end());
-      all.texture_coordinates.resize(all.positions.size(), vec2(0));
-    }
-    if (parts.materials) {
-      all.materials.insert(all.materials.end(), mesh.materials.begin(), mesh.materials.end());
-      all.materials.resize(all.triangles.size(), 0);
-    }
-  }
-  return all;
-}
-
-}  // namespace
 
 RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream)
     : settings_(settings), stream_(stream), bounds_(bounds(scene)) {
-  if (scene.triangle_count() >= no_primitive || scene.vertex_count() >= no_primitive)
-    throw InputError(scene.name + ": more than 2^32 - 2 triangles or vertices; 32-bit numbers name them");
   count_ = static_cast<std::uint32_t>(scene.triangle_count());
   if (!settings.specialise) settings_.keep = {true, true, true, true, true};
   const Keep& keep = settings_.keep;
   const bool diffuse_needed = keep.materials || settings.shading == Shading::lambert;
-  const Parts parts{reads_normals(settings) || keep.normals,
+  const MeshParts parts{reads_normals(settings) || keep.normals,
                     keep.texture_coordinates && scene.features.texture_coordinates,
                     diffuse_needed && (scene.features.materials || keep.materials)};
-  const Mesh mesh = united_mesh(scene, parts);
+  const Mesh mesh = flattened(scene, parts);
   positions_ = Buffer(stream_, mesh.positions);
   triangles_ = Buffer(stream_, mesh.triangles);
   normals_ = Buffer(stream_, mesh.normals);

@@ -27,6 +27,7 @@ using vec3 = Vec3<float>;
 using vec4 = Vec4<float>;
 using dvec3 = Vec3<double>;
 using uvec3 = Vec3<std::uint32_t>;
+using u8vec4 = Vec4<std::uint8_t>;
 
 constexpr double pi = 3.14159265358979323846;
 

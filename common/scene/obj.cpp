@@ -372,7 +372,10 @@ bool read_library(const std::filesystem::path& file, Materials& materials) {
   for (const tinyobj::material_t& material : read) {
     const std::string name = trimmed(material.name);
     const vec3 diffuse(material.diffuse[0], material.diffuse[1], material.diffuse[2]);
-    materials.try_emplace(name, Material{name, diffuse});  // the first of a name holds
+    Material& made = materials.try_emplace(name).first->second;
+    if (!made.name.empty()) continue;  // the first of a name holds
+    made.name = name;
+    made.diffuse = diffuse;
   }
   return true;
 }
@@ -404,10 +407,9 @@ void add_materials(const std::string& path, const std::vector<std::string>& name
       scene.materials.push_back(found->second);
       continue;
     }
-    scene.materials.push_back({name.empty() ? "default" : name});
+    scene.materials.emplace_back().name = name.empty() ? "default" : name;
     if (!name.empty()) missing += (missing.empty() ? "" : ", ") + in_quotes(name);
   }
-  if (scene.materials.empty()) scene.materials.push_back({"default"});
   if (!missing.empty()) {
     scene.warnings.push_back(path + ": no library defines the material " + missing + ": grey instead");
   }
@@ -570,15 +572,14 @@ Parse scanned_and_parsed(const std::string& path, Scene& scene, std::vector<Scan
 
 }  // namespace
 
-Scene load_obj(const std::string& path) try {
+Scene load_obj(const std::string& path, const LoadOptions&) try {
   Scene scene;
   scene.name = std::filesystem::path(path).stem().string();
   std::vector<Scan::Library> libraries;
   const Parse parse = scanned_and_parsed(path, scene, libraries);  // the text is gone from here on
   add_materials(path, parse.materials.list, read_libraries(path, libraries, scene.warnings), scene);
   Build(path, parse, scene);
-  scene.features = features_of(scene);
-  scene.camera = framing(bounds(scene), {0, 1, 0});
+  finish(scene, {0, 1, 0}, false);
   return scene;
 } catch (const std::bad_alloc&) {
   refuse(path, 0, "does not fit into memory; split it");

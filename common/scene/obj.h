@@ -14,6 +14,6 @@ namespace trilha {
 /// not finite as a float, or a face names a vertex that does not exist. What is left out or mended is said in
 /// Scene::warnings: lines, points and other statements, materials that no library defines (they are grey),
 /// normals of no length. Limits: 2³¹ − 1 vertices, 2³² − 2 triangles, 10 000 corners a face.
-Scene load_obj(const std::string& path);
+Scene load_obj(const std::string& path, const LoadOptions& options = {});
 
 }  // namespace trilha

@@ -1,0 +1,52 @@
+#pragma once
+// Scenes that are made on demand, of any size: "--scene hall:detail=4,angle=30".
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/scene/scene.h"
+
+namespace trilha {
+
+struct Parameter {
+  const char* name;
+  const char* help;
+  double value, low, high;  ///< what it is unless said, and the range that it is taken from
+  bool whole = true;        ///< only whole numbers
+};
+
+/// Values for the parameters of a made scene.
+class Parameters {
+ public:
+  /// Reads "name=value,name=value"; what is not named keeps its value. Throws InputError for a name that is
+  /// not there (naming those that are), a name given twice, what is no number or out of range.
+  Parameters(const std::string& scene, const std::vector<Parameter>& declared, std::string_view text);
+
+  double operator[](std::string_view name) const;
+  int whole(std::string_view name) const;
+
+ private:
+  std::vector<Parameter> values_;
+};
+
+struct MadeScene {
+  const char* name;
+  const char* what;  ///< for people, in a few words
+  std::vector<Parameter> parameters;
+  /// Makes it: the same bits for the same parameters, on any machine (so no sin, cos or pow of the C library:
+  /// common/scene/made/turn.h has them).
+  Scene (*make)(const Parameters&);
+};
+
+/// All of them.
+const std::vector<MadeScene>& made_scenes();
+
+// What the files in common/scene/made/ bring.
+std::vector<MadeScene> hall_scenes();
+std::vector<MadeScene> box_and_shape_scenes();
+std::vector<MadeScene> whitted_scenes();
+std::vector<MadeScene> tea_scenes();
+std::vector<MadeScene> extreme_scenes();
+
+}  // namespace trilha

@@ -1,0 +1,7 @@
+#include "common/scene/made.h"
+
+namespace trilha {
+
+std::vector<MadeScene> box_and_shape_scenes() { return {}; }
+
+}  // namespace trilha

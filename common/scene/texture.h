@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/math/vector.h"
+#include "common/scene/load.h"
+
+namespace trilha {
+
+struct Scene;
+
+/// What the numbers of a texture mean: colours, which files hold encoded as sRGB, or numbers that are used as
+/// they are (normals, heights, roughness, alpha).
+enum class TextureUse : std::uint8_t { colour, data };
+
+/// What lies beyond the edge of a texture.
+enum class Wrap : std::uint8_t { repeat, clamp, mirror };
+
+/// width × height texels of red, green, blue, alpha, row by row from the top. One of the vectors is filled.
+struct TextureLevel {
+  int width = 0, height = 0;
+  std::vector<u8vec4> bytes;  ///< of what files hold in eight bits; colours encoded as sRGB
+  std::vector<vec4> floats;   ///< of all else: linear, alpha in [0, 1]
+};
+
+/// An image that a material names, with its mip chain. Texture coordinate (0, 0) is the lower left corner of
+/// the image, (1, 1) the upper right one.
+struct Texture {
+  std::string name;  ///< its file, for people
+  TextureUse use = TextureUse::colour;
+  Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
+  bool has_alpha = false;  ///< a texel is not opaque
+  bool missing = false;    ///< its file could not be found: magenta and black squares
+  /// Largest first; each half as wide and high as the one before, rounded down, at least 1; the last is 1×1.
+  /// A texel is the mean of the area it covers, taken in linear light where the texture holds colours.
+  std::vector<TextureLevel> levels;
+
+  std::size_t bytes() const;
+};
+
+/// The texel in linear light, whatever it is stored as.
+vec4 texel(const Texture& texture, int level, int x, int y);
+
+/// The mean of the whole texture in linear light: its smallest level.
+vec4 mean(const Texture& texture);
+
+/// A texture with its whole mip chain from texels in eight bits, row by row from the top.
+Texture make_texture(std::string name, int width, int height, std::vector<u8vec4> texels, TextureUse use);
+
+/// Gathers the textures of a scene while it is read: an image is decoded once for each use that is made of
+/// it, however many materials name it, and not at all where LoadOptions::textures says no.
+class TextureSet {
+ public:
+  TextureSet(Scene& scene, const LoadOptions& options) : scene_(scene), options_(options) {}
+
+  struct How {
+    TextureUse use = TextureUse::colour;
+    Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
+  };
+
+  /// The number in Scene::textures of the image in that file, which line `line` of the file `path` names (0:
+  /// no line applies); −1 where textures are not wanted. A file that does not exist becomes the magenta
+  /// texture, with a warning. Throws InputError where the image is refused (Limits: sides of 16384, 2²⁶
+  /// texels, and a file of n bytes has at most 2²⁰ + 64·n texels; all textures of a scene have 2²⁸ at most).
+  std::int32_t add(const std::filesystem::path& file, const How& how, const std::string& path,
+                   std::size_t line);
+
+  /// The same for an image that lies inside the file `path` (glTF); `name` tells it from others there.
+  std::int32_t add(const std::string& name, std::string_view encoded, const How& how, const std::string& path,
+                   std::size_t line);
+
+ private:
+  Scene& scene_;
+  const LoadOptions& options_;
+  std::map<std::string, std::int32_t> numbers_;  // by file and use
+};
+
+}  // namespace trilha
