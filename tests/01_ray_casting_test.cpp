@@ -519,7 +519,7 @@ TEST_CASE("what is left out changes no pixel and saves memory") {
   mesh.materials.assign(mesh.triangles.size(), 0);
   for (std::size_t i = 0; i < mesh.materials.size(); i += 2) mesh.materials[i] = 1;
   Scene scene = scene_of(mesh);
-  scene.materials.push_back({"red", vec3(0.8f, 0.1f, 0.1f)});
+  scene.materials.emplace_back().diffuse = vec3(0.8f, 0.1f, 0.1f);
   scene.features = features_of(scene);
   REQUIRE(scene.features.texture_coordinates);
   REQUIRE(scene.features.materials);

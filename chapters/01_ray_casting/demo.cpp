@@ -49,6 +49,25 @@ class RayCastingDemo final : public Demo {
                   "build and compile in only what scene and settings need");
   }
 
+  LoadOptions reads() const override {
+    LoadOptions parts;
+    parts.textures = settings_.shading == Shading::lambert;  // for their mean colours
+    parts.environment = false;
+    return parts;
+  }
+
+  std::vector<std::string> not_shown(const Scene& scene) const override {
+    std::vector<std::string> list;
+    const auto add = [&](std::size_t n, const std::string& what) {
+      if (n > 0)
+        list.push_back(scene.name + ": " + std::to_string(n) + " " + what + (n == 1 ? "" : "s") +
+                       " not shown; this chapter has triangles alone");
+    };
+    add(scene.spheres.size(), "sphere");
+    add(scene.planes.size(), "plane");
+    return list;
+  }
+
   void build(const Scene& scene, const Stream& stream) override {
     scene_ = &scene;
     caster_.reset();
@@ -103,7 +122,9 @@ class RayCastingDemo final : public Demo {
            settings_.smooth ? shading + " reads none"
                             : "normals are flat, one a triangle (--smooth reads them)");
     if (scene_->features.texture_coordinates)
-      omit(&Keep::texture_coordinates, "texture coordinates", "this chapter has no textures");
+      omit(&Keep::texture_coordinates, "texture coordinates",
+           scene_->features.textures ? "this chapter shows a texture's mean colour"
+                                     : "no material has a texture");
     if (settings_.shading != Shading::lambert)
       omit(&Keep::materials, "materials", shading + " shows no colours of the scene");
     else if (!scene_->features.materials)

@@ -118,8 +118,8 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
   const Keep& keep = settings_.keep;
   const bool diffuse_needed = keep.materials || settings.shading == Shading::lambert;
   const MeshParts parts{reads_normals(settings) || keep.normals,
-                    keep.texture_coordinates && scene.features.texture_coordinates,
-                    diffuse_needed && (scene.features.materials || keep.materials)};
+                        keep.texture_coordinates && scene.features.texture_coordinates,
+                        diffuse_needed && (scene.features.materials || keep.materials)};
   const Mesh mesh = flattened(scene, parts);
   positions_ = Buffer(stream_, mesh.positions);
   triangles_ = Buffer(stream_, mesh.triangles);
@@ -128,7 +128,12 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
   materials_ = Buffer(stream_, mesh.materials);
   if (diffuse_needed) {
     std::vector<vec3> diffuse;
-    for (const Material& material : scene.materials) diffuse.push_back(material.diffuse);
+    for (const Material& material : scene.materials) {
+      const std::int32_t texture = material.diffuse_map.texture;
+      diffuse.push_back(texture < 0 ? material.diffuse
+                                    : material.diffuse *
+                                          vec3(mean(scene.textures[static_cast<std::size_t>(texture)])));
+    }
     diffuse_ = Buffer(stream_, diffuse);
   }
   with_test(settings_.test, [&](auto test) {

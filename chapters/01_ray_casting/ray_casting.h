@@ -243,7 +243,7 @@ struct SurfaceView {
   const vec3* normals = nullptr;
   const vec2* texture_coordinates = nullptr;
   const std::uint32_t* materials = nullptr;
-  const vec3* diffuse = nullptr;  ///< one a material
+  const vec3* diffuse = nullptr;  ///< one a material: its colour times its texture's mean
 };
 
 /// How much of the surface a shading mode reads. `everything` is the kernel of --no-specialise.

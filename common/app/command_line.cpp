@@ -105,6 +105,8 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
   bool headless = false;
   app.add_option("--scene", options.scene, "name of a scene (--list-scenes), or a file")
       ->type_name("NAME|FILE");
+  app.add_flag("--allow-paths", options.allow_paths, "scene files may name files outside their folder");
+  app.add_option("--view", options.view, "a view of the scene, by its name")->type_name("NAME");
   app.add_option("--backend", backend, "where to compute [auto]: auto|cpu|cuda")->type_name("NAME");
   app.add_flag("--headless", headless, "render to a file, open no window (this version has none yet)");
   app.add_option("--output", options.output, "the image, .png or .hdr [" + program + ".png]")

@@ -12,6 +12,8 @@ namespace trilha {
 /// What every chapter's program can be told, beside the settings of its chapter.
 struct Options {
   std::string scene;               ///< a name or a file; empty for the default
+  bool allow_paths = false;        ///< scene files may name files outside their folder
+  std::string view;                ///< one of the scene's; empty for its camera
   std::optional<Backend> backend;  ///< empty: CUDA if it is there
   std::string output;              ///< empty: <chapter>.png in the working directory
   int width = 640, height = 480;

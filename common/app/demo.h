@@ -46,6 +46,11 @@ class Demo {
 
   virtual void declare_settings(Settings& settings) = 0;
 
+  /// The parts of a scene that this chapter reads with its settings as they are: others are not even loaded.
+  virtual LoadOptions reads() const { return {}; }
+  /// What of the scene this chapter cannot show, a line each.
+  virtual std::vector<std::string> not_shown(const Scene& /*scene*/) const { return {}; }
+
   /// Builds all that the settings need, on the stream's backend; replaces what was built before. The scene
   /// stays alive and unchanged until the next build.
   virtual void build(const Scene& scene, const Stream& stream) = 0;

@@ -34,7 +34,7 @@ constexpr double band_ms = 400;
 
 /// What one run did.
 struct Outcome {
-  double build_ms = 0, render_ms = 0, rays = 0;
+  double load_ms = 0, build_ms = 0, render_ms = 0, rays = 0;
   std::size_t bytes = 0;  ///< that the buffers of the backend held at most
   int samples = 0;        ///< complete ones
   bool stopped = false;
@@ -57,12 +57,31 @@ Backend choose_backend(const Options& options) {
   return Backend::cpu;
 }
 
-Scene load(const Options& options) {
-  Scene scene = load_scene(options.scene);
+/// Chooses the camera: the scene's or a view of it, made to suit the image, but for what the user says.
+void choose_camera(Scene& scene, const Options& options) {
+  if (!options.view.empty()) {
+    std::string names;
+    const auto named = [&](const View& view) {
+      names += (names.empty() ? "" : ", ") + view.name;
+      return view.name == options.view;
+    };
+    const auto found = std::find_if(scene.views.begin(), scene.views.end(), named);
+    if (found == scene.views.end())
+      throw InputError("--view: " + scene.name + " has no view '" + options.view + "'; it has " +
+                       (names.empty() ? "none" : names));
+    scene.camera = found->camera;
+  }
+  scene.camera = for_aspect(scene.camera, double(options.width) / options.height);
   if (options.eye) scene.camera.eye = *options.eye;
   if (options.target) scene.camera.target = *options.target;
   if (options.up) scene.camera.up = *options.up;
   if (options.field_of_view) scene.camera.field_of_view = *options.field_of_view;
+}
+
+Scene load(const Options& options, LoadOptions how) {
+  how.allow_paths = options.allow_paths;
+  Scene scene = load_scene(options.scene, how);
+  choose_camera(scene, options);
   return scene;
 }
 
@@ -169,7 +188,9 @@ void print_text(const Scene& scene, const Stream& stream, const Options& options
   line("image") << options.output << ", " << options.width << "x" << options.height << ", " << outcome.samples
                 << (outcome.samples == 1 ? " sample" : " samples") << " a pixel"
                 << (outcome.stopped ? " (stopped before its end)" : "") << "\n";
-  line("scene") << scene.name << ", " << scene.triangle_count() << " triangles\n";
+  line("scene") << scene.name << ", " << scene.triangle_count() << " triangles, "
+                << with_unit(static_cast<double>(bytes(scene))) << ", loaded in "
+                << number(outcome.load_ms, 1) << " ms\n";
   line("machine") << device_name(stream.backend()) << "\n";
   line("build") << number(outcome.build_ms, 2) << " ms\n";
   line("render") << number(outcome.render_ms, 1) << " ms";
@@ -212,6 +233,8 @@ void print_json(const Demo& demo, const Settings& settings, const Scene& scene, 
   const Json all = {{"chapter", demo.name().first},
                     {"scene", scene.name},
                     {"triangles", scene.triangle_count()},
+                    {"scene_bytes", bytes(scene)},
+                    {"load_ms", outcome.load_ms},
                     {"backend", name(stream.backend())},
                     {"device", device_name(stream.backend())},
                     {"output", options.output},
@@ -274,7 +297,7 @@ void run_report(Demo& demo, const Settings& settings, const Options& options,
     for (const std::string& text : options.sweeps) sweeps.push_back(Sweep::parse(text, settings));
     if (sweeps.size() == 2 && sweeps[0].name == sweeps[1].name)
       throw UsageError("--sweep: " + sweeps[0].name + " is named twice; give its values in one list");
-    const Scene scene = load(options);
+    const Scene scene = load(options, {});  // whatever a value of the settings may read
     for (const std::string& warning : scene.warnings) warn(warning);
     report.run({sweep_experiment(sweeps, settings, scene, choose_backend(options), options.width,
                                  options.height, options.samples, make_demo)});
@@ -340,10 +363,14 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   }
   check_can_write(options.output);
   const Stream stream = choose_backend(options);
-  const Scene scene = load(options);
+  const auto start = Clock::now();
+  const Scene scene = load(options, demo.reads());
+  const double load_ms = milliseconds_since(start);
   for (const std::string& warning : scene.warnings) warn(warning);
+  for (const std::string& warning : demo.not_shown(scene)) warn(warning);
 
   Outcome outcome = build(demo, scene, stream);
+  outcome.load_ms = load_ms;
   std::vector<Saving> savings;
   for (const Omission& omission : demo.omissions()) savings.push_back({omission, {}, {}});
   {

@@ -25,7 +25,7 @@ void for_each_placed(const Scene& scene, const Visit& visit) {
 
 }  // namespace
 
-Camera framing(const Box& box, const vec3& up, double aspect) {
+Camera framing(const Box& box, const vec3& up) {
   constexpr double azimuth = 30 * degree, elevation = 20 * degree, margin = 1.05;
   Camera camera;
   const dvec3 lower = box.empty() ? dvec3(0) : dvec3(box.lower);
@@ -37,8 +37,7 @@ Camera framing(const Box& box, const vec3& up, double aspect) {
 
   // Eye and target are rounded to floats: far from the origin that moves them by as much as the box is wide.
   // The sphere that is framed holds the box wherever they go.
-  const double half = 0.5 * camera.field_of_view * degree;
-  const double sine = std::sin(std::min(half, std::atan(std::tan(half) * aspect)));
+  const double sine = std::sin(0.5 * camera.field_of_view * degree);
   const double rounding = std::numeric_limits<float>::epsilon() * (distance_from_origin + 4 * radius);
   const double distance = margin * (radius + rounding) / sine + 2 * rounding;
 
@@ -51,6 +50,45 @@ Camera framing(const Box& box, const vec3& up, double aspect) {
   camera.eye = rounded(centre + distance * towards_eye);
   camera.target = rounded(centre);
   camera.up = vec3(above);
+  return camera;
+}
+
+namespace {
+
+/// The solid angle of a triangle seen from the origin, in steradians; positive where its front is seen.
+double solid_angle(const dvec3& a, const dvec3& b, const dvec3& c) {
+  const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
+  const double below = la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
+  return -2 * std::atan2(glm::dot(a, glm::cross(b, c)), below);
+}
+
+/// How much of the sphere around the point is covered by front faces, less what back faces cover: 1 in a
+/// closed room, −1 in a closed body.
+double inwardness(const Scene& scene, const dvec3& point) {
+  double sum = 0;
+  for_each_placed(scene, [&](const Mesh& mesh, const Instance* instance) {
+    const auto seen = [&](std::uint32_t i) {
+      const dvec3 p = mesh.positions[i];
+      return (instance == nullptr ? p : apply(instance->transform, p)) - point;
+    };
+    const double sign = instance != nullptr && mirrors(instance->transform) ? -1 : 1;
+    for (const uvec3& t : mesh.triangles) sum += sign * solid_angle(seen(t.x), seen(t.y), seen(t.z));
+  });
+  return sum / (4 * pi);
+}
+
+}  // namespace
+
+Camera framing(const Scene& scene, const vec3& up) {
+  const Box box = bounds(scene);
+  return framing(box, up);
+}
+
+Camera for_aspect(Camera camera, double aspect) {
+  if (aspect < 1) {
+    const double half = 0.5 * camera.field_of_view * degree;
+    camera.field_of_view = static_cast<float>(2 / degree * std::atan(std::tan(half) / aspect));
+  }
   return camera;
 }
 
@@ -167,7 +205,7 @@ SceneFeatures features_of(const Scene& scene) {
 void finish(Scene& scene, const vec3& up, bool camera_known) {
   if (scene.materials.empty()) scene.materials.emplace_back().name = "default";
   scene.features = features_of(scene);
-  if (!camera_known) scene.camera = framing(bounds(scene), up);
+  if (!camera_known) scene.camera = framing(scene, up);
 }
 
 }  // namespace trilha

@@ -147,9 +147,18 @@ Box bounds(const Scene& scene);
 /// Bytes of meshes, instances and textures.
 std::size_t bytes(const Scene& scene);
 
-/// A camera that sees the whole box from a little above and to the side, in an image of any shape that is at
-/// least `aspect` (width over height) wide. `up` is the axis that points up.
-Camera framing(const Box& box, const vec3& up, double aspect = 1);
+/// A camera that sees the whole box from a little above and to the side, in every image that is at least as
+/// wide as high. `up` is the axis that points up.
+Camera framing(const Box& box, const vec3& up);
+
+/// A camera for the scene: inside it, looking along its longest way, where it is a room; else framing() of
+/// its bounds. A room is what has its front faces turned inwards around its middle: the solid angles of its
+/// triangles there (van Oosterom & Strackee 1983), front faces positive, sum up to half a sphere or more.
+Camera framing(const Scene& scene, const vec3& up);
+
+/// The camera for an image of that aspect (width over height): where that is higher than wide, the field of
+/// view becomes that of the width, so that what the camera was meant to show is there.
+Camera for_aspect(Camera camera, double aspect);
 
 /// The features of the scene as its meshes and materials stand now.
 SceneFeatures features_of(const Scene& scene);

@@ -48,7 +48,7 @@ std::string in_quotes(std::string_view text) {
   return result;
 }
 
-std::string read_text(const std::string& path) {
+std::string read_bytes(const std::string& path, std::size_t most) {
   if (path.empty()) throw InputError("no file was named; name one");
   if (path.find('\0') != std::string::npos)
     refuse(path, 0, "a name with a NUL byte; no file can be called that");
@@ -61,9 +61,16 @@ std::string read_text(const std::string& path) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
   if (size < 0) refuse(path, 0, "cannot be read; check its permissions");
-  std::string text(static_cast<std::size_t>(size), '\0');
+  if (static_cast<std::size_t>(size) > most)
+    refuse(path, 0, "has " + std::to_string(size) + " bytes; " + std::to_string(most) + " are the most");
+  std::string bytes(static_cast<std::size_t>(size), '\0');
   file.seekg(0);
-  if (!file.read(text.data(), size)) refuse(path, 0, "cannot be read to its end; check the disk");
+  if (!file.read(bytes.data(), size)) refuse(path, 0, "cannot be read to its end; check the disk");
+  return bytes;
+}
+
+std::string read_text(const std::string& path) {
+  std::string text = read_bytes(path);
   const auto binary = std::find_if(text.begin(), text.end(), is_binary);
   if (binary != text.end()) {
     const auto line = 1 + std::count(text.begin(), binary, '\n');

@@ -2,6 +2,7 @@
 // Reading text files strictly: what the OBJ, MTL and BPT readers share.
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -13,6 +14,10 @@ namespace trilha {
 
 /// The text in quotes, cut to 40 bytes, without what could break a line of output.
 std::string in_quotes(std::string_view text);
+
+/// The bytes of the file. Throws InputError where that is missing, a folder, not readable, or has more than
+/// `most` bytes.
+std::string read_bytes(const std::string& path, std::size_t most = SIZE_MAX);
 
 /// The text of the file. Throws InputError where that is missing, a folder, not readable, or holds bytes that
 /// no text has.

@@ -3,6 +3,7 @@
 
 #include "common/scene/library.h"
 #include "common/scene/made.h"
+#include "common/scene/made/turn.h"
 #include "common/scene/newell.h"
 
 namespace trilha {
@@ -20,16 +21,6 @@ Mesh tea_ware(const char* name) {
   Mesh mesh = tessellate(load_bpt((root_folder() / "assets" / "newell" / name).string() + ".bpt"), quads);
   mesh.name = name;
   return mesh;
-}
-
-glm::dmat3 turned(int axis, double degrees) {
-  const double angle = degrees * pi / 180;
-  glm::dmat3 rotation(1);
-  const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-  rotation[a][a] = rotation[b][b] = std::cos(angle);
-  rotation[a][b] = std::sin(angle);
-  rotation[b][a] = -rotation[a][b];
-  return rotation;
 }
 
 /// The mesh rotated, scaled, and stood at (x, y, 0) on its lowest point.
@@ -56,8 +47,8 @@ void fill(Mesh& cup) {
   cup.materials.assign(cup.triangles.size(), porcelain);
   cup.positions.push_back(dvec3(0, height, 0));
   for (std::uint32_t i = 0; i < corners; ++i) {
-    const double angle = 2 * pi * i / corners;
-    cup.positions.push_back(dvec3(radius * std::sin(angle), height, radius * std::cos(angle)));
+    const auto [cosine, sine] = turn(360.0 * i / corners);
+    cup.positions.push_back(dvec3(radius * sine, height, radius * cosine));
     cup.triangles.push_back({centre, centre + 1 + i, centre + 1 + (i + 1) % corners});
     cup.materials.push_back(tea);
   }
