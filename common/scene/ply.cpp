@@ -305,7 +305,8 @@ class AsciiValues {
   std::int64_t whole(Type type, const char* what) {
     const std::int64_t value = text_.whole(what);
     if (value < info(type).least || value > info(type).greatest)
-      fail(std::to_string(value) + " does not fit " + info(type).name + ", which the header says of " + what);
+      fail(std::to_string(value) + " does not fit; the header says that " + what + " is of type " +
+           info(type).name);
     return value;
   }
   void skip(Type, std::uint64_t n) {
