@@ -630,7 +630,7 @@ TEST_CASE("PLY: a header that promises more than the file can hold is refused be
   check_refused(text_of("element vertex 1000000000\n" + xyz + f, data), 3, "at least 6 bytes each");
   check_refused(binary("element vertex 1000000000\n" + xyz + f, data), 3, "at least 12 bytes each");
   check_refused(text_of(v + "element face 1000000000\n" + indices, data), 7, "at least 2 bytes each");
-  check_refused(binary("element face 1000000000\n" + indices + v, data), 3, "at least 1 bytes each");
+  check_refused(binary("element face 1000000000\n" + indices + v, data), 3, "at least 1 byte each");
   check_refused(packed(text_of("element vertex 2000000000\n" + xyz + f, data)), 3, "at least 6 bytes each");
   check_refused(binary("element junk 18446744073709551615\nproperty double a\n" + v, data), 3,
                 "at least 8 bytes");
