@@ -23,8 +23,9 @@ std::string counted(std::uint64_t n, const std::string& what);
 template <class T>
 void make_room(std::vector<T>& vector, std::uint64_t expected) {
   if (vector.size() < vector.capacity()) return;
-  const std::uint64_t more = std::max<std::uint64_t>(8 * vector.size(), 1024);
-  vector.reserve(std::max<std::uint64_t>(std::min(more, expected), vector.size() + vector.size() / 2 + 1));
+  const std::uint64_t size = vector.size();
+  vector.reserve(size < expected ? std::min<std::uint64_t>(expected, std::max<std::uint64_t>(8 * size, 1024))
+                                 : size + size / 2 + 1);
 }
 
 /// Collects vertices and faces, in any order, and makes a scene of them. Triangles and vertices keep the

@@ -14,6 +14,7 @@
 #include "common/math/random.h"
 #include "common/scene/block_reader.h"
 #include "common/scene/polygon.h"
+#include "common/scene/polygon_mesh.h"
 #include "tests/common/mesh_files.h"
 
 using namespace trilha;
@@ -746,6 +747,25 @@ TEST_CASE("PLY: a face may have 10000 corners") {
   }
   const Table face{"face", {{"ushort", "uint", "vertex_indices"}}, {{corners}}};
   CHECK(loaded(written({vertices(points), face}, Format::little)).triangle_count() == 9998);
+}
+
+// Catches: room for what is promised rather than for what has come, and room for twice what will come.
+TEST_CASE("PLY: room is made in proportion to what is there") {
+  std::vector<int> promised;
+  make_room(promised, 4'000'000'000);
+  CHECK(promised.capacity() <= 1024);
+  for (const std::size_t n : {1, 1000, 1025, 100'000, 300'000}) {
+    std::vector<int> vector;
+    for (std::size_t i = 0; i < n; ++i) {
+      make_room(vector, n);
+      if (vector.capacity() > std::max<std::size_t>(8 * i, 1024)) FAIL(vector.capacity());
+      vector.push_back(0);
+    }
+    CHECK(vector.capacity() == n);
+    make_room(vector, n);  // a quadrilateral makes two
+    CHECK(vector.capacity() > n);
+    CHECK(vector.capacity() <= 2 * n);
+  }
 }
 
 // Catches: files held whole, meshes held twice, a gzip bomb that fills memory.
