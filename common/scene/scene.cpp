@@ -141,13 +141,12 @@ Camera framing(const Scene& scene, const vec3& up) {
     (along < 0 || size[axis] > size[along] ? (side = along, along) : side) = axis;
   }
   if (side < 0) return outside;
-  const auto room_at = [&](double off_centre) {
+  const auto room_at = [&](double off_centre, int tenths) {
     dvec3 point = centre;
     point[along] += off_centre * size[along];
-    return surrounded(seen_from(scene, point, around(16)), 7);
+    return surrounded(seen_from(scene, point, around(16)), tenths);
   };
-  if (!room_at(0) && !(room_at(0.25) && room_at(-0.25)))
-    return outside;  // what if something stands in the middle?
+  if (!room_at(0, 7) && !(room_at(0.25, 9) && room_at(-0.25, 9))) return outside;
 
   // From an end towards the other, as near to the wall behind as the view is free; of the two ends, the one
   // that looks less out of the door.
