@@ -48,7 +48,7 @@ std::string in_quotes(std::string_view text) {
   return result;
 }
 
-std::string read_bytes(const std::string& path, std::size_t most) {
+std::ifstream open_file(const std::string& path, std::size_t& size) {
   if (path.empty()) throw InputError("no file was named; name one");
   if (path.find('\0') != std::string::npos)
     refuse(path, 0, "a name with a NUL byte; no file can be called that");
@@ -59,13 +59,21 @@ std::string read_bytes(const std::string& path, std::size_t most) {
   if (!std::filesystem::is_regular_file(status))
     refuse(path, 0, "is not a regular file; save it to one first");
   std::ifstream file(path, std::ios::binary | std::ios::ate);
-  const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
-  if (size < 0) refuse(path, 0, "cannot be read; check its permissions");
-  if (static_cast<std::size_t>(size) > most)
-    refuse(path, 0, "has " + std::to_string(size) + " bytes; " + std::to_string(most) + " are the most");
-  std::string bytes(static_cast<std::size_t>(size), '\0');
+  const std::streamoff end = file ? static_cast<std::streamoff>(file.tellg()) : -1;
+  if (end < 0) refuse(path, 0, "cannot be read; check its permissions");
+  size = static_cast<std::size_t>(end);
   file.seekg(0);
-  if (!file.read(bytes.data(), size)) refuse(path, 0, "cannot be read to its end; check the disk");
+  return file;
+}
+
+std::string read_bytes(const std::string& path, std::size_t most) {
+  std::size_t size = 0;
+  std::ifstream file = open_file(path, size);
+  if (size > most)
+    refuse(path, 0, "has " + std::to_string(size) + " bytes; " + std::to_string(most) + " are the most");
+  std::string bytes(size, '\0');
+  if (!file.read(bytes.data(), static_cast<std::streamsize>(size)))
+    refuse(path, 0, "cannot be read to its end; check the disk");
   return bytes;
 }
 

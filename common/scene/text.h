@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <iosfwd>
 #include <string>
 #include <string_view>
 
@@ -14,6 +15,10 @@ namespace trilha {
 
 /// The text in quotes, cut to 40 bytes, without what could break a line of output.
 std::string in_quotes(std::string_view text);
+
+/// Opens the file and says how many bytes it has. Throws InputError where it is missing, a folder, no regular
+/// file, or not readable.
+std::ifstream open_file(const std::string& path, std::size_t& size);
 
 /// The bytes of the file. Throws InputError where that is missing, a folder, not readable, or has more than
 /// `most` bytes.

@@ -1,0 +1,119 @@
+#include "common/scene/polygon_mesh.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "common/scene/polygon.h"
+#include "common/scene/text.h"
+
+namespace trilha {
+
+std::string counted(std::uint64_t n, const std::string& what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+vec3 unit_or_zero(const dvec3& normal) {
+  const double length = glm::length(normal);
+  return length > 0 ? vec3(normal / length) : vec3(0);
+}
+
+std::string scene_name(const std::string& path) {
+  std::filesystem::path name = std::filesystem::path(path).filename();
+  if (name.extension() == ".gz") name = name.stem();
+  return name.stem().string();
+}
+
+void PolygonMesh::push(const uvec3& triangle, std::uint64_t expected) {
+  if (mesh.triangles.size() == most_triangles)
+    refuse(path_, 0, "more than 4294967294 triangles; split the file");
+  make_room(mesh.triangles, expected);
+  mesh.triangles.push_back(triangle);
+}
+
+void PolygonMesh::add_face(const std::vector<std::uint32_t>& corners, std::uint64_t expected) {
+  if (corners.size() < 3) {
+    ++too_few_corners_;
+    return;
+  }
+  if (corners.size() == 3) {
+    const uvec3 t(corners[0], corners[1], corners[2]);
+    without_area_ += t.x == t.y || t.y == t.z || t.z == t.x;
+    push(t, expected);
+    return;
+  }
+  // n corners fit into n − 2 triangles.
+  const Unsplit polygon{static_cast<std::uint32_t>(mesh.triangles.size()),
+                        static_cast<std::uint32_t>(corners.size())};
+  for (std::size_t i = 0; i < corners.size() - 2; ++i) push(uvec3(0), expected);
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    mesh.triangles[polygon.first + i / 3][static_cast<int>(i % 3)] = corners[i];
+  if (vertices_known_) {
+    split(polygon);
+  } else {
+    unsplit_.push_back(polygon);
+  }
+}
+
+void PolygonMesh::split(const Unsplit& polygon) {
+  corners_.clear();
+  points_.clear();
+  for (std::size_t i = 0; i < polygon.corners; ++i) {
+    corners_.push_back(mesh.triangles[polygon.first + i / 3][static_cast<int>(i % 3)]);
+    points_.push_back(mesh.positions[corners_.back()]);
+  }
+  crossed_ += !split_polygon(points_, split_);
+  for (std::size_t i = 0; i < split_.size(); ++i) {
+    const uvec3& t = split_[i];
+    mesh.triangles[polygon.first + i] = {corners_[t.x], corners_[t.y], corners_[t.z]};
+  }
+}
+
+void PolygonMesh::vertices_are_known() {
+  vertices_known_ = true;
+  for (const Unsplit& polygon : unsplit_) split(polygon);
+  std::vector<Unsplit>().swap(unsplit_);
+}
+
+void PolygonMesh::add_of_strip(const uvec3& t) {
+  if (t.x == t.y || t.y == t.z || t.z == t.x) {
+    ++stitches_;
+  } else {
+    push(t, 0);
+  }
+}
+
+void PolygonMesh::mend_normals() {
+  const auto zero = std::count(mesh.normals.begin(), mesh.normals.end(), vec3(0));
+  if (zero == 0) return;
+  const std::vector<vec3> given = std::move(mesh.normals);
+  make_normals(mesh);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (given[i] != vec3(0)) mesh.normals[i] = given[i];
+  }
+  warnings.push_back(path_ + ": " + counted(static_cast<std::uint64_t>(zero), "vertex normal") +
+                     " of zero length made from the faces");
+}
+
+Scene PolygonMesh::scene() {
+  Scene scene;
+  scene.name = scene_name(path_);
+  const auto warn = [&](std::uint64_t n, const char* what, const std::string& consequence) {
+    if (n > 0) warnings.push_back(path_ + ": " + counted(n, what) + consequence);
+  };
+  warn(crossed_, "polygon", " twisted, crossing itself or without area, split as well as could be");
+  warn(without_area_, "face", " with a vertex twice: triangles without area, kept");
+  warn(too_few_corners_, "face", " with fewer than 3 corners left out");
+  warn(stitches_, "triangle", " of strips that had a vertex twice, stitches between them, left out");
+  if (mesh.triangles.empty()) {
+    warnings.push_back(path_ + ": no faces in it: the scene is empty");
+  } else {
+    mend_normals();
+    mesh.name = scene.name;
+    scene.meshes.push_back(std::move(mesh));
+  }
+  scene.warnings = std::move(warnings);
+  finish(scene, {0, 1, 0}, false);
+  return scene;
+}
+
+}  // namespace trilha
