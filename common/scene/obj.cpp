@@ -38,7 +38,9 @@ constexpr KindName kinds[3] = {{"v", "vertex"}, {"vt", "texture coordinate"}, {"
 struct Corner {
   std::array<std::int32_t, 3> index{-1, -1, -1};
 
-  bool operator==(const Corner&) const = default;
+  bool operator==(const Corner& other) const {  // three comparisons instead of a call of memcmp
+    return index[0] == other.index[0] && index[1] == other.index[1] && index[2] == other.index[2];
+  }
 };
 
 /// A mesh as it grows, whose vertices are still corners of the file.

@@ -20,7 +20,7 @@ bool is_line_break(char c) { return c == '\n' || c == '\r'; }
 // A control character that text files do not hold: neither tab, line break nor form feed.
 bool is_binary(char c) {
   const auto byte = static_cast<unsigned char>(c);
-  return byte < 9 || (byte > 13 && byte < 32);
+  return (byte < 9) | ((byte > 13) & (byte < 32));
 }
 
 std::string printable(std::string_view text) {
@@ -78,9 +78,9 @@ std::ifstream opened(const std::string& path, std::size_t& size) {
 
 /// Refuses bytes that are in no text; so many lines came before.
 void check_text(const std::string& path, std::string_view text, std::size_t lines) {
-  bool any = false;
-  for (const char c : text) any |= is_binary(c);  // without a branch: many bytes at a time
-  if (!any) return;
+  unsigned any = 0;
+  for (const char c : text) any |= unsigned{is_binary(c)};  // without a branch: many bytes at a time
+  if (any == 0) return;
   const auto binary = std::find_if(text.begin(), text.end(), is_binary);
   lines += 1 + static_cast<std::size_t>(std::count(text.begin(), binary, '\n'));
   refuse(path, lines,
