@@ -187,14 +187,14 @@ Statements::Statements(TextFile& file) : file_(&file) {
 bool Statements::more() {
   if (after_ != end_of_text_) return true;
   if (file_ == nullptr) return false;
-  // The statement so far goes to the front of the block, which grows where it is nearly all of it.
+  // The statement so far goes to the front of the block, which grows where it takes half of it.
   constexpr std::size_t least = std::size_t{1} << 18, most = std::size_t{1} << 24;
   const auto kept = static_cast<std::size_t>(end_of_text_ - cursor_);
   const auto end = static_cast<std::size_t>(end_ - cursor_);
-  if (kept > most)
+  if (kept == most)
     refuse(file_->path(), line_, "a statement of more than " + std::to_string(most) + " bytes; split it");
   std::copy(cursor_, end_of_text_, block_.data());
-  if (2 * kept >= block_.size()) block_.resize(std::max(least, 2 * block_.size()));
+  if (2 * kept >= block_.size()) block_.resize(std::clamp(2 * block_.size(), least, most));
   cursor_ = block_.data();
   end_ = cursor_ + end;
   after_ = cursor_ + kept;
