@@ -73,7 +73,7 @@ Mesh ear() {
   const double reach[5] = {0.02, 0.18, 0.38, 0.56, 0.70}, height[5] = {0.24, 0.40, 0.50, 0.46, 0.28};
   const double drop[5] = {0.00, 0.05, 0.13, 0.20, 0.24}, thickness[5] = {0.05, 0.055, 0.05, 0.04, 0.03};
   for (int i = 0; i < 5; ++i)
-    sections.push_back({at(reach[i], drop[i]), height[i] * across, -thickness[i] * thick, 10});
+    sections.push_back({at(reach[i], drop[i]), height[i] * across, thickness[i] * thick, 10});
   return loft(at(-0.04, 0), sections, at(0.76, 0.25));
 }
 

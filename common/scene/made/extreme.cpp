@@ -40,7 +40,7 @@ bool looks_from_inside(const ExtremeTrial& trial, const Box& box, Camera& camera
 
 Scene make(const Parameters& parameters) {
   const ExtremeCase chosen = extreme_cases()[static_cast<std::size_t>(parameters.whole("case"))];
-  ExtremeTrial trial = chosen.make(8, 8);
+  ExtremeTrial trial = chosen.make(48, 48);
   Scene scene;
   scene.name = "extreme";
   scene.materials = {coloured("clay", {0.75f, 0.6f, 0.45f})};

@@ -54,7 +54,8 @@ Scene teapot(const Parameters& parameters) {
   scene.name = "teapot";
   scene.meshes = {tea_ware("teapot", parameters)};
   scene.materials = {coloured("porcelain", {0.8f, 0.78f, 0.72f})};
-  finish(scene, {0, 0, 1}, false);
+  scene.camera = {{5.6f, -9.6f, 5.4f}, {0.2f, 0, 1.4f}, {0, 0, 1}, 29};
+  finish(scene, {0, 0, 1}, true);
   return scene;
 }
 

@@ -74,22 +74,26 @@ Slope gradient_noise(double x, double y, std::uint64_t seed) {
 
 double terrain_height(double x, double y, std::uint64_t seed) {
   // Far away mountains, near by a valley with a lake, whichever the seed.
-  const double bend = gradient_noise(2.2 * x, 2.2 * y, seed ^ 1).value;
-  const double mountains = step(0.22, 0.95, y + 0.45 * bend);
-  double px = 5 * x, py = 5 * y, amplitude = 0.5, dx = 0, dy = 0, hills = 0, ridges = 0, crest = 1;
+  const Slope bend = gradient_noise(2.2 * x, 2.2 * y, seed ^ 1);
+  const double mountains = step(0.06, 0.8, y + 0.4 * bend.value);
+  // Coordinates that are bent themselves make ranges bend.
+  double px = 4.5 * (x + 0.1 * bend.value), py = 4.5 * (y + 0.1 * bend.dx), amplitude = 0.5;
+  double dx = 0, dy = 0, hills = 0, ridges = 0, crest = 1;
   for (std::uint64_t octave = 0; octave < 9; ++octave) {
     const Slope noise = gradient_noise(px, py, seed + 2 + octave);
     dx += noise.dx, dy += noise.dy;
-    hills += amplitude * noise.value / (1 + 0.6 * (dx * dx + dy * dy));
-    const double ridge = 1 - std::abs(1.6 * noise.value);
+    const double worn = 1 + 0.6 * (dx * dx + dy * dy);
+    hills += amplitude * noise.value / worn;
+    const double ridge = 1 - 1.5 * std::sqrt(noise.value * noise.value + 0.002);  // no knife's edge
     ridges += amplitude * ridge * ridge * crest;
-    crest = std::min(std::max(ridge * ridge, 0.0), 1.0);  // detail belongs to the crests
-    amplitude *= octave == 0 ? 0.5 : 0.47;
+    crest = std::min(std::max(1.25 * ridge, 0.0), 1.0);  // detail belongs to the crests
+    amplitude *= 0.45;
     // Turned by the angle of the triangle 3, 4, 5, so that no two octaves' lattices lie along each other.
     const double qx = 2 * (0.8 * px - 0.6 * py), qy = 2 * (0.6 * px + 0.8 * py);
     px = qx, py = qy;
   }
-  return 0.01 + 0.075 * hills - 0.022 * (1 - mountains) + mountains * (0.16 * ridges * ridges + 0.05 * hills);
+  return 0.006 + 0.07 * hills - 0.02 * (1 - mountains) +
+         mountains * (0.14 * ridges * (0.25 + ridges) - 0.012 + 0.10 * hills);
 }
 
 namespace {
@@ -108,15 +112,15 @@ struct Grid {
   std::size_t vertex(std::size_t column, std::size_t row) const { return row * (columns + 1) + column; }
 };
 
-/// By the height and the steepness of the triangle; `chance` in [0, 1) blurs the borders between them.
+/// By the height and the steepness of the triangle; `chance`, about 0 to 1, moves the borders between them.
 TerrainMaterial cover(double height, double up, double chance) {
   if (height <= 0) return water;
-  const double blurred = height + side * 0.006 * (chance - 0.5);
-  if (blurred < side * 0.0022) return shore;
-  if (blurred > side * 0.092 && up > 0.62 + 0.08 * chance) return snow;
-  if (up < 0.66 + 0.06 * chance) return rock;
-  if (blurred > side * 0.070) return scree;
-  return up < 0.86 + 0.1 * chance && blurred > side * 0.006 ? forest : meadow;
+  const double blurred = height + side * 0.02 * (chance - 0.5);
+  if (height < side * 0.0012) return shore;
+  if (blurred > side * 0.074 && up > 0.55) return snow;
+  if (up < 0.66 + 0.08 * chance) return rock;
+  if (blurred > side * 0.056) return scree;
+  return chance > 0.45 ? forest : meadow;
 }
 
 Mesh landscape(std::size_t triangles, std::uint64_t seed) {
@@ -152,18 +156,20 @@ Mesh landscape(std::size_t triangles, std::uint64_t seed) {
     }
   });
   for_each_row(grid.rows, [&](std::size_t row) {
+    const double y = static_cast<double>(row) / static_cast<double>(grid.rows);
     for (std::size_t column = 0; column < grid.columns; ++column) {
       const std::size_t cell = row * grid.columns + column;
       const auto a = static_cast<std::uint32_t>(grid.vertex(column, row)), b = a + 1;
       const auto d = static_cast<std::uint32_t>(grid.vertex(column, row + 1)), c = d + 1;
+      const double x = static_cast<double>(column) / static_cast<double>(grid.columns);
+      const double chance = 0.5 + 0.8 * gradient_noise(24 * x, 24 * y, seed).value +
+                            0.4 * gradient_noise(90 * x, 90 * y, seed).value;
       for (std::size_t half = 0; half < 2; ++half) {
         const uvec3 t = half == 0 ? uvec3(a, b, c) : uvec3(a, c, d);
         mesh.triangles[2 * cell + half] = t;
         const dvec3 p = mesh.positions[t.x], q = mesh.positions[t.y], r = mesh.positions[t.z];
         const double up = glm::normalize(glm::cross(q - p, r - p)).y;
-        const double chance =
-            static_cast<double>(hashed(static_cast<std::int64_t>(2 * cell + half), 0, seed) >> 11);
-        mesh.materials[2 * cell + half] = cover(std::max({p.y, q.y, r.y}), up, chance * 0x1p-53);
+        mesh.materials[2 * cell + half] = cover(std::max({p.y, q.y, r.y}), up, chance);
       }
     }
   });
@@ -204,7 +210,7 @@ Scene make(const Parameters& parameters) {
   scene.lights = {sun};
   scene.ambient = {0.15f, 0.18f, 0.24f};
   scene.environment.colour = {0.45f, 0.62f, 0.85f};
-  scene.camera = {{-0.6f, 2.7f, 7.6f}, {0, 0.25f, 0}, {0, 1, 0}, 40};
+  scene.camera = {{-0.3f, 2.4f, 6.8f}, {0, 0.2f, 0}, {0, 1, 0}, 38};
   scene.views = {{"from above", {{0, 13.5f, 0.1f}, {0, 0, 0}, {0, 1, 0}, 45}}};
   finish(scene, {0, 1, 0}, true);
   return scene;
@@ -215,7 +221,7 @@ Scene make(const Parameters& parameters) {
 MadeScene terrain_scene() {
   return {"terrain",
           "a valley with a lake amid mountains, of exactly as many triangles as asked for",
-          {{"triangles", "how many", 20000, 2, 1e7}, {"seed", "which landscape", 1, 0, 1e9}},
+          {{"triangles", "how many", 20000, 2, 1e7}, {"seed", "which landscape", 3, 0, 1e9}},
           make};
 }
 

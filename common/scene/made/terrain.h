@@ -10,7 +10,7 @@ struct Slope {
 };
 
 /// Gradient noise (Perlin 1985, with the fifth-degree fade of 2002): 0 at points of whole numbers, where its
-/// gradient is one of 64 unit vectors by a hash of the point and the seed; within ±0.75; twice continuously
+/// gradient is one of 64 unit vectors by a hash of the point and the seed; within ±√½; twice continuously
 /// differentiable. |x|, |y| < 2³¹. The same bits on any machine.
 Slope gradient_noise(double x, double y, std::uint64_t seed);
 

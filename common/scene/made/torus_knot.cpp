@@ -81,7 +81,7 @@ Scene make(const Parameters& parameters) {
   }
   scene.lights = {point_light("lamp", {-5, -6, 9}, vec3(120)), point_light("fill", {8, 2, 4}, vec3(30))};
   scene.ambient = vec3(0.1f);
-  scene.camera = {{1.6f, -7.2f, 6.4f}, {0, -0.15f, 0}, {0, 0, 1}, 42};
+  scene.camera = {{1.6f, -7.2f, 6.4f}, {0, -0.25f, 0}, {0, 0, 1}, 36};
   finish(scene, {0, 0, 1}, true);
   return scene;
 }

@@ -34,7 +34,7 @@ Scene pri(const Parameters& parameters) {
   scene.meshes = {std::move(sphere), std::move(box)};
   scene.lights = {point_light("left", {-4, 5, 4}, vec3(30)), point_light("right", {4, 6, 2}, vec3(20))};
   scene.ambient = vec3(0.1f);
-  scene.camera = {{0.9f, 2.9f, 6.6f}, {0.2f, 0.85f, 0}, {0, 1, 0}, 36};
+  scene.camera = {{0.9f, 2.7f, 6.4f}, {0.14f, 0.85f, 0}, {0, 1, 0}, 30};
   finish(scene, {0, 1, 0}, true);
   return scene;
 }
@@ -64,15 +64,15 @@ Scene dist(const Parameters& parameters) {
        {0.9, -3.6, 40},
        {-3.2, 2.0, -15},
        {5.2, 5.0, -160}},
-      {{-1.2, -1.6, 0},
-       {0.2, -0.9, 40},
-       {1.1, 0.1, 80},
-       {-0.4, 0.6, 120},
-       {-1.7, 0.2, 160},
-       {0.6, -2.2, 200},
-       {-2.4, -1.1, 240},
-       {-0.8, 1.8, 280},
-       {1.9, -1.2, 320}},
+      {{-1.8, -2.4, 0},
+       {0.3, -1.3, 40},
+       {1.7, 0.2, 80},
+       {-0.6, 0.9, 120},
+       {-2.5, 0.3, 160},
+       {0.9, -3.3, 200},
+       {-3.6, -1.6, 240},
+       {-1.2, 2.7, 280},
+       {2.9, -1.8, 320}},
   };
   Scene scene;
   scene.name = "dist";
@@ -80,7 +80,7 @@ Scene dist(const Parameters& parameters) {
                      coloured("eye", {0.03f, 0.03f, 0.03f}), coloured("floor", {0.62f, 0.52f, 0.36f}),
                      coloured("walls", {0.45f, 0.60f, 0.62f})};
   constexpr std::uint32_t floor = elephant_materials, walls = floor + 1;
-  constexpr double side = 8, height = 7;
+  constexpr double side = 7.4, height = 5;
   Mesh room;
   room.name = "room";
   add_quad(room, {-side, 0, side}, {side, 0, side}, {side, 0, -side}, {-side, 0, -side}, floor);
@@ -93,7 +93,7 @@ Scene dist(const Parameters& parameters) {
         {1, -1, translation({place.x, 0, place.z}) * linear(turned(1, place.degrees - 45))});
   scene.lights = {point_light("lamp", {6, 12, 5}, vec3(200))};
   scene.ambient = vec3(0.15f);
-  scene.camera = {{19.5f, 11.5f, 17}, {-0.3f, 1.2f, -0.2f}, {0, 1, 0}, 36};
+  scene.camera = {{17.5f, 11.5f, 15.5f}, {0, 0.2f, 0}, {0, 1, 0}, 34};
   finish(scene, {0, 1, 0}, true);
   return scene;
 }
@@ -121,7 +121,7 @@ Scene alexandra(const Parameters&) {
   scene.meshes = {std::move(sphere), std::move(boxes)};
   scene.lights = {point_light("lamp", {4, 8, 5}, vec3(70))};
   scene.ambient = vec3(0.12f);
-  scene.camera = {{1.6f, 6.2f, 9.6f}, {0, 0.3f, 0}, {0, 1, 0}, 40};
+  scene.camera = {{1.6f, 6.6f, 10.4f}, {0, 0.1f, 0}, {0, 1, 0}, 38};
   finish(scene, {0, 1, 0}, true);
   return scene;
 }
