@@ -20,7 +20,7 @@ std::string word_of(const std::string& name) {
   return word;
 }
 
-/// Where the case's rays start, if that is one place within the box: such a case is to be seen from inside.
+/// Looks as the case's rays do, if they all start at one place within the box.
 bool looks_from_inside(const ExtremeTrial& trial, const Box& box, Camera& camera) {
   const vec3 eye = trial.rays[1].origin;
   dvec3 sum(0);
@@ -30,11 +30,10 @@ bool looks_from_inside(const ExtremeTrial& trial, const Box& box, Camera& camera
     sum += glm::normalize(dvec3(ray.direction));
   }
   if (!(glm::all(glm::lessThan(box.lower, eye)) && glm::all(glm::lessThan(eye, box.upper)))) return false;
-  // Rays that go everywhere have no middle: then any direction is as good.
-  const double all = static_cast<double>(trial.rays.size());
-  const dvec3 forwards = glm::length(sum) > 0.5 * all ? glm::normalize(sum) : dvec3(1, 0, 0);
+  // Rays that go everywhere show no picture from there.
+  if (!(glm::length(sum) > 0.5 * static_cast<double>(trial.rays.size()))) return false;
   const double size = glm::length(dvec3(box.upper) - dvec3(box.lower));
-  camera = {eye, vec3(dvec3(eye) + size * forwards), {0, 1, 0}, glm::length(sum) > 0.5 * all ? 46.0f : 90.0f};
+  camera = {eye, vec3(dvec3(eye) + size * glm::normalize(sum)), {0, 1, 0}, 46};
   return true;
 }
 
@@ -50,7 +49,6 @@ Scene make(const Parameters& parameters) {
   if (!looks_from_inside(trial, box, scene.camera)) scene.camera = framing(box, {0, 1, 0});
   trial.mesh.name = chosen.name;
   scene.meshes = {std::move(trial.mesh)};
-  scene.lights = {};
   scene.ambient = vec3(0.2f);
   Light sun;
   sun.name = "sun";

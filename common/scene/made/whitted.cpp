@@ -93,7 +93,7 @@ Scene dist(const Parameters& parameters) {
         {1, -1, translation({place.x, 0, place.z}) * linear(turned(1, place.degrees - 45))});
   scene.lights = {point_light("lamp", {6, 12, 5}, vec3(200))};
   scene.ambient = vec3(0.15f);
-  scene.camera = {{17.5f, 11.5f, 15.5f}, {0, 0.2f, 0}, {0, 1, 0}, 34};
+  scene.camera = {{17.5f, 11.5f, 15.5f}, {0, 0.2f, 0}, {0, 1, 0}, 38};
   finish(scene, {0, 1, 0}, true);
   return scene;
 }
