@@ -549,6 +549,27 @@ TEST_CASE("a sphereflake's spheres touch, and none enters another") {
           return std::abs(s.centre.z - std::sqrt(2.0 / 3) * 2 / 3) < 1e-6;
         }) == 3);
 
+  // All nine lie 60° from their nearest, and on each child its children lie as on the first sphere, which has
+  // been turned the short way from up to that child.
+  std::vector<dvec3> ways;
+  for (std::size_t i = 1; i <= 9; ++i) ways.push_back(glm::normalize(dvec3(spheres[i].centre)));
+  for (const dvec3& way : ways) {
+    int at_60 = 0;
+    for (const dvec3& other : ways) {
+      if (&other == &way) continue;
+      CHECK(glm::dot(way, other) < 0.5 + 1e-6);
+      at_60 += glm::dot(way, other) > 0.5 - 1e-6;
+    }
+    CHECK(at_60 >= 2);
+  }
+  for (std::size_t i = 0; i < 81; ++i) {
+    const dvec3 to = ways[i / 9], p = ways[i % 9], up(0, 0, 1), axis = glm::cross(up, to);
+    const dvec3 turned_way =
+        to.z * p + glm::cross(axis, p) + axis * glm::dot(axis, p) / (1 + to.z);  // Rodrigues
+    const dvec3 found = glm::normalize(dvec3(spheres[10 + i].centre) - dvec3(spheres[1 + i / 9].centre));
+    CHECK(glm::length(turned_way - found) < 1e-5);
+  }
+
   // Triangles on instances are the same flake.
   const Scene scene = load_scene("sphereflake:level=2,subdivisions=2,coarser=0");
   REQUIRE(scene.instances.size() == 1 + 91);

@@ -48,7 +48,7 @@ Scene make(const Parameters& parameters) {
     if (finite(position)) box = united(box, position);
   if (!looks_from_inside(trial, box, scene.camera)) scene.camera = framing(box, {0, 1, 0});
   trial.mesh.name = chosen.name;
-  scene.meshes = {std::move(trial.mesh)};
+  scene.meshes.push_back(std::move(trial.mesh));
   scene.ambient = vec3(0.2f);
   Light sun;
   sun.name = "sun";

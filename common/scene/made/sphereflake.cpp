@@ -41,15 +41,16 @@ void grow(int levels, const Place& place) {
   const std::vector<glm::dmat3> rotations = children();
   std::vector<Ball> level{{dvec3(0), glm::dmat3(1)}};
   double radius = 0.5;
-  for (int depth = 0;; ++depth) {
-    for (const Ball& parent : level) place(depth, parent.centre, radius, parent.frame);
-    if (depth == levels) return;
+  place(0, level[0].centre, radius, level[0].frame);
+  for (int depth = 1; depth <= levels; ++depth) {
     std::vector<Ball> next;
-    next.reserve(9 * level.size());
+    if (depth < levels) next.reserve(9 * level.size());
     for (const Ball& parent : level)
       for (const glm::dmat3& rotation : rotations) {
         const glm::dmat3 frame = parent.frame * rotation;
-        next.push_back({parent.centre + 4.0 / 3 * radius * frame[2], frame});
+        const dvec3 centre = parent.centre + 4.0 / 3 * radius * frame[2];
+        place(depth, centre, radius / 3, frame);
+        if (depth < levels) next.push_back({centre, frame});  // the last level bears none
       }
     level = std::move(next);
     radius /= 3;

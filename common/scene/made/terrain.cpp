@@ -200,8 +200,8 @@ Scene make(const Parameters& parameters) {
                      coloured("snow", {0.92f, 0.94f, 0.97f})};
   scene.materials[water].reflection = vec3(0.4f);
   scene.materials[water].roughness = 0.05f;
-  scene.meshes = {landscape(static_cast<std::size_t>(parameters["triangles"]),
-                            static_cast<std::uint64_t>(parameters["seed"]))};
+  scene.meshes.push_back(landscape(static_cast<std::size_t>(parameters["triangles"]),
+                                   static_cast<std::uint64_t>(parameters["seed"])));
   Light sun;
   sun.name = "sun";
   sun.kind = Light::Kind::directional;
