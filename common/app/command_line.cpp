@@ -155,7 +155,9 @@ void ConfigFile::read(const std::string& path, CLI::App& app) {
     if (!value.empty() && value[0] == '[' && (uncommented.size() < 2 || uncommented.back() != ']'))
       refuse(path_, line_, "a list is not closed by ']'; close it on its line");
     std::istringstream one(name + " = " + (equals == line.npos ? "true" : value));
-    for (CLI::ConfigItem& item : CLI::ConfigBase().from_config(one)) {
+    CLI::ConfigBase reader;
+    reader.parentSeparator('\0');  // names have no parts
+    for (CLI::ConfigItem& item : reader.from_config(one)) {
       // CLI11 splits at commas and spaces; here only a list in brackets is more than one text
       if (item.inputs.size() > 1 && value[0] != '[') item.inputs = {uncommented};
       take(item, app);
@@ -198,8 +200,10 @@ void ConfigFile::take(const CLI::ConfigItem& item, CLI::App& app) {
       option->add_result(item.inputs);
     }
     option->run_callback();
-  } catch (const CLI::ParseError& error) {
-    refuse(path_, line_, std::string(error.what()) + "; --help says what " + key + " takes");
+  } catch (const CLI::ParseError&) {
+    std::string values;
+    for (const std::string& value : item.inputs) values += (values.empty() ? "" : ", ") + value;
+    refuse(path_, line_, key + " does not take " + in_quotes(values) + "; --help says what it takes");
   } catch (const UsageError& error) {
     refuse(path_, line_, error.what());
   } catch (const InputError& error) {
