@@ -32,6 +32,12 @@ struct Options {
 
 /// Reads the command line (and a --config file) into options, settings and the demo's heat map. Returns an
 /// exit code if the program is done, after --help say. Throws UsageError and InputError.
+///
+/// A --config file holds a flag a line: "name = value", or a name alone for "true"; '#' and ';' begin
+/// comments, quotes hold a value together, [a, b] is a list for what may be said more than once. What the
+/// command line says goes first. The file has at most 1 MiB and 1024 bytes a line. What is wrong with it,
+/// unknown names as well as wrong values, is an InputError (exit code 1) with file, line and name, for it was
+/// read, not typed.
 std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings& settings, Options& options);
 
 }  // namespace trilha
