@@ -137,10 +137,15 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
   app.add_flag("--stability", options.stability, "run the stiff and extreme cases: who fails what, and why");
   app.add_flag("--explain", options.explain, "say what was left out and measure what that saved");
   app.add_flag("--list-settings", options.list_settings, "list the settings with their choices");
-  auto* list_scenes =
-      app.add_option("--list-scenes", options.listed, "list the scenes that have a name, or say more of one")
-          ->type_name("[NAME]")
-          ->expected(0, 1);
+  app.add_option_function<std::string>(
+         "--list-scenes",
+         [&](const std::string& name) {
+           options.list_scenes = true;
+           options.listed = name;
+         },
+         "list the scenes that have a name, or say more of one")
+      ->type_name("[NAME]")
+      ->expected(0, 1);
   app.add_flag("--json", options.json, "print the result as JSON");
   app.add_flag("--quiet", options.quiet, "print nothing but warnings and errors");
   add_settings(app, settings);
@@ -153,7 +158,6 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
     throw UsageError(std::string(error.what()) + " (--help lists the flags)");
   }
 
-  options.list_scenes = list_scenes->count() > 0;
   const bool fixed_scenes = options.stability || (!options.report.empty() && options.sweeps.empty());
   static const std::set<std::string> have_a_part{"--backend", "--headless", "--seed",          "--threads",
                                                  "--config",  "--report",   "--report-budget", "--stability",

@@ -207,7 +207,7 @@ Scene under_sky(const fs::path& file, const LoadOptions& options) {
   scene.environment.colour = vec3(1);
   scene.environment.file = file.filename().string();
   if (options.environment) scene.environment.image = as_light(read_image(file.string()));
-  scene.camera = {{0, 2.2f, 9}, {0, 0.9f, 0}, {0, 1, 0}, 34};
+  scene.camera = {{0, 3.4f, 9}, {0, 0.75f, 0}, {0, 1, 0}, 32};
   finish(scene, {0, 1, 0}, true);
   return scene;
 }
