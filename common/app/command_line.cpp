@@ -270,7 +270,15 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
   app.add_flag("--stability", options.stability, "run the stiff and extreme cases: who fails what, and why");
   app.add_flag("--explain", options.explain, "say what was left out and measure what that saved");
   app.add_flag("--list-settings", options.list_settings, "list the settings with their choices");
-  app.add_flag("--list-scenes", options.list_scenes, "list the scenes that have a name");
+  app.add_option_function<std::string>(
+         "--list-scenes",
+         [&](const std::string& name) {
+           options.list_scenes = true;
+           options.listed = name;
+         },
+         "list the scenes that have a name, or say more of one")
+      ->type_name("[NAME]")
+      ->expected(0, 1);
   app.add_flag("--json", options.json, "print the result as JSON");
   app.add_flag("--quiet", options.quiet, "print nothing but warnings and errors");
   add_settings(app, settings);

@@ -28,6 +28,7 @@ struct Options {
   std::vector<std::string> sweeps;
   bool stability = false;
   bool explain = false, json = false, quiet = false, list_settings = false, list_scenes = false;
+  std::string listed;  ///< the scene or collection that --list-scenes names; empty for all
 };
 
 /// Reads the command line (and a --config file) into options, settings and the demo's heat map. Returns an
