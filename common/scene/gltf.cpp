@@ -969,7 +969,7 @@ class Meshes {
                          counted(vertices, "position") + ", numbered from 0");
       return static_cast<std::uint32_t>(number);
     };
-    mesh.triangles.reserve(mesh.triangles.size() + count);
+    if (mesh.triangles.empty()) mesh.triangles.reserve(count);  // further ones: as vectors grow
     if (mode == triangles) {
       for (std::size_t i = 0; i < count; ++i)
         mesh.triangles.push_back({vertex(3 * i), vertex(3 * i + 1), vertex(3 * i + 2)});
