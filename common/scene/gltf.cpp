@@ -33,7 +33,7 @@ namespace fs = std::filesystem;
 constexpr double largest = std::numeric_limits<float>::max();
 constexpr std::int64_t most_elements = 4294967294;          // what 32 bits number
 constexpr std::int64_t most_bytes = std::int64_t{1} << 53;  // up to there a double is a whole number
-constexpr std::size_t most_per_byte = 16;  // triangles: a strip of bytes has one, and bytes may be shared
+constexpr std::size_t most_per_byte = 4;  // triangles: a strip of bytes has one, and bytes may be shared
 
 std::string counted(std::size_t n, const std::string& what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
@@ -287,9 +287,9 @@ class File {
   void charge(std::size_t elements, const Item& by) {
     charged_ += elements;
     if (charged_ > most_per_byte * size_)
-      by.refuse("brings what the file asks for to " + std::to_string(charged_) +
-                " triangles or instances; its " + std::to_string(size_) + " bytes may hold " +
-                std::to_string(most_per_byte) + " each");
+      by.refuse("brings what the file makes of its " + counted(size_, "byte") + " to " +
+                std::to_string(charged_) + " triangles (an instance counts as four); " +
+                std::to_string(most_per_byte) + " a byte are the most");
   }
 
  private:
@@ -1233,7 +1233,8 @@ class Nodes {
       count = part->count;
     }
     if (count == 0) attributes.refuse("place nothing; TRANSLATION, ROTATION or SCALE do");
-    file_.charge(count, node);
+    constexpr std::size_t in_triangles = 4;  // what one takes in memory
+    file_.charge(in_triangles * count, node);
     for (std::size_t i = 0; i < count; ++i) {
       const Vec4<double> turn = turns != nullptr ? (*turns)[i] : Vec4<double>(0, 0, 0, 1);
       const Transform each = here * placed(moves != nullptr ? dvec3((*moves)[i]) : dvec3(0), turn,

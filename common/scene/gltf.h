@@ -28,7 +28,7 @@ namespace trilha {
 ///
 /// Throws InputError, with the key's line, for what is malformed, reaches beyond its buffer, requires an
 /// extension that is not read, or has a node with two parents, in a circle, or with a singular transform; for
-/// numbers that are not finite as floats; and where primitives that share their bytes would have more than 16
+/// numbers that are not finite as floats; and where primitives that share their bytes would have more than 4
 /// triangles for each byte of the file and its buffers.
 Scene load_gltf(const std::string& path, const LoadOptions& options = {});
 
