@@ -61,14 +61,15 @@ void hdr(const std::string& label, std::string_view bytes, ImageSink& sink) {
     const bool runs = columns >= 8 && row[0] == 2 && row[1] == 2 && row[2] < 128;
     if (runs) {
       if (static_cast<std::size_t>(row[2] << 8 | row[3]) != columns)
-        refuse(label, "its row " + std::to_string(y) + " has another width than the image");
+        refuse(label, "its row " + std::to_string(y) + " has another width than the image; write it again");
       for (std::size_t k = 0; k < row.size();) {
         const std::size_t rest = columns - k % columns;  // runs end with their row
         std::size_t count = byte();
         const bool same = count > 128;
         if (same) count -= 128;
         if (count == 0 || count > rest)
-          refuse(label, "its row " + std::to_string(y) + " has a run of bytes that does not fit");
+          refuse(label,
+                 "its row " + std::to_string(y) + " has a run of bytes that does not fit; write it again");
         unsigned char value = same ? byte() : 0;
         for (; count > 0; --count) row[k++] = same ? value : byte();
       }

@@ -48,12 +48,11 @@ class Headers {
       if (several_parts && at_ == bytes_.size()) refuse_as_cut_short(label_);
     } while (several_parts && bytes_[at_] != '\0');
     if (width == 0) refuse(label_, "its header has no data window; write it again");
-    const double block = std::max(double(width) * lines_, tile_texels_) * texel_bytes_;
-    const double most = 0x1p26 + 1024 * double(bytes_.size());
-    if (block > most)
-      refuse(label_, "its channels take " + std::to_string(static_cast<long long>(block)) +
-                         " bytes a block; for a file of " + std::to_string(bytes_.size()) + " bytes, " +
-                         std::to_string(static_cast<long long>(most)) + " are the most");
+    const double block = std::max(static_cast<double>(width) * lines_, tile_texels_) * texel_bytes_;
+    if (block > 0x1p26 + 1024 * static_cast<double>(bytes_.size()))
+      refuse(label_, "its channels take " + std::to_string(static_cast<long long>(block / 0x1p20)) +
+                         " MiB a block, more than a file of " + std::to_string(bytes_.size()) +
+                         " bytes is good for; write smaller tiles or fewer channels");
   }
 
   long long width = 0, height = 0;  ///< of the first part
@@ -192,9 +191,13 @@ void exr(const std::string& label, std::string_view bytes, ImageSink& sink) {
     throw;
   } catch (const std::exception& error) {
     std::string reason = error.what();
+    constexpr std::string_view prefix = "Cannot read image file \"memory\". ";
+    if (reason.starts_with(prefix)) reason.erase(0, prefix.size());
     std::replace_if(
         reason.begin(), reason.end(), [](unsigned char c) { return c < 32; }, ' ');
-    refuse(label, reason.substr(0, 200) + "; write an OpenEXR file of R, G and B");
+    reason.resize(std::min<std::size_t>(reason.size(), 200));  // it may quote names from the file
+    while (!reason.empty() && (reason.back() == '.' || reason.back() == ' ')) reason.pop_back();
+    refuse(label, reason + "; write an OpenEXR file of R, G and B");
   }
 }
 
