@@ -36,8 +36,41 @@ class Input : public Imf::IStream {
   std::size_t at_ = 0;
 };
 
+/// How many bytes the library reads of an attribute of that type, whatever length the file gives it; −1 where
+/// it heeds the length.
+int fixed_length(std::string_view type) {
+  constexpr std::pair<std::string_view, int> lengths[] = {{"box2f", 16},
+                                                          {"box2i", 16},
+                                                          {"chromaticities", 32},
+                                                          {"compression", 1},
+                                                          {"deepImageState", 1},
+                                                          {"double", 8},
+                                                          {"envmap", 1},
+                                                          {"float", 4},
+                                                          {"int", 4},
+                                                          {"keycode", 28},
+                                                          {"lineOrder", 1},
+                                                          {"m33d", 72},
+                                                          {"m33f", 36},
+                                                          {"m44d", 128},
+                                                          {"m44f", 64},
+                                                          {"rational", 8},
+                                                          {"tiledesc", 9},
+                                                          {"timecode", 8},
+                                                          {"v2d", 16},
+                                                          {"v2f", 8},
+                                                          {"v2i", 8},
+                                                          {"v3d", 24},
+                                                          {"v3f", 12},
+                                                          {"v3i", 12}};
+  for (const auto& [name, length] : lengths)
+    if (name == type) return length;
+  return -1;
+}
+
 /// Walks through the headers before the library does, which allocates what an attribute, a data window, a
-/// list of channels or a size of tiles claims.
+/// list of channels or a size of tiles claims, and which reads an attribute beyond its length where its type
+/// tells it to: both have to see the same attributes.
 class Headers {
  public:
   Headers(const std::string& label, std::string_view bytes, ImageSink& sink)
@@ -66,6 +99,8 @@ class Headers {
     return static_cast<std::int32_t>(value);
   }
 
+  std::uint32_t number() { return static_cast<std::uint32_t>(integer()); }
+
   std::string_view text() {
     const std::size_t end = bytes_.find('\0', at_);
     if (end == std::string_view::npos) refuse_as_cut_short(label_);
@@ -78,20 +113,29 @@ class Headers {
   void part() {
     const bool first = width == 0;
     for (std::string_view name = text(); !name.empty(); name = text()) {
-      text();  // its type
+      const std::string_view type = text();
       const std::int32_t length = integer();
       if (length < 0 || static_cast<std::size_t>(length) > bytes_.size() - at_) refuse_as_cut_short(label_);
       const std::size_t end = at_ + static_cast<std::size_t>(length);
-      if (name == "dataWindow" && length == 16) {
+      if (const int wanted = fixed_length(type); (wanted >= 0 && wanted != length) || type == "idmanifest")
+        refuse_attribute();
+      if (name == "dataWindow" && type == "box2i") {
         window(first);
-      } else if (first && name == "channels") {
-        channels(end);
-      } else if (first && name == "compression" && length == 1) {
+      } else if (type == "chlist") {
+        channels(end, first && name == "channels");
+      } else if (type == "preview") {
+        const std::uint64_t x = number(), y = number();
+        if (length < 8 || x > 0xffff || y > 0xffff || x * y * 4 + 8 != static_cast<std::uint64_t>(length))
+          refuse_attribute();
+      } else if (type == "stringvector") {
+        while (at_ < end) at_ += number();
+        if (at_ != end) refuse_attribute();
+      } else if (first && type == "compression") {
         constexpr int lines[] = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
         const auto kind = static_cast<unsigned char>(bytes_[at_]);
         lines_ = std::max(lines_, kind < std::size(lines) ? lines[kind] : 1);  // the library refuses the rest
-      } else if (first && name == "tiles" && length == 9) {
-        const double x = static_cast<std::uint32_t>(integer()), y = static_cast<std::uint32_t>(integer());
+      } else if (first && type == "tiledesc") {
+        const double x = number(), y = number();
         tile_texels_ = std::max(tile_texels_, x * y);
       }
       at_ = end;
@@ -119,12 +163,17 @@ class Headers {
     }
   }
 
-  void channels(std::size_t end) {
-    while (at_ < end && !text().empty()) {
-      if (end < at_ + 16) refuse_as_cut_short(label_);
-      texel_bytes_ += integer() == Imf::HALF ? 2 : 4;
+  void channels(std::size_t end, bool are_read) {
+    while (!text().empty()) {
+      if (end < at_ + 16) refuse_attribute();
+      if (const int bytes = integer() == Imf::HALF ? 2 : 4; are_read) texel_bytes_ += bytes;
       at_ += 12;
     }
+    if (at_ != end) refuse_attribute();
+  }
+
+  [[noreturn]] void refuse_attribute() const {
+    refuse(label_, "it has an attribute whose length is not that of its type; write it again");
   }
 
   static constexpr long long most_side = 65536;  // of parts that are not read
