@@ -34,7 +34,7 @@ Scene pri(const Parameters& parameters) {
   scene.meshes = {std::move(sphere), std::move(box)};
   scene.lights = {point_light("left", {-4, 5, 4}, vec3(30)), point_light("right", {4, 6, 2}, vec3(20))};
   scene.ambient = vec3(0.1f);
-  scene.camera = {{0.9f, 2.7f, 6.4f}, {0.14f, 0.85f, 0}, {0, 1, 0}, 30};
+  scene.camera = {{0.9f, 2.7f, 6.4f}, {0.16f, 0.85f, 0}, {0, 1, 0}, 33};
   finish(scene, {0, 1, 0}, true);
   return scene;
 }
@@ -121,7 +121,7 @@ Scene alexandra(const Parameters&) {
   scene.meshes = {std::move(sphere), std::move(boxes)};
   scene.lights = {point_light("lamp", {4, 8, 5}, vec3(70))};
   scene.ambient = vec3(0.12f);
-  scene.camera = {{1.6f, 6.6f, 10.4f}, {0, 0.1f, 0}, {0, 1, 0}, 38};
+  scene.camera = {{1.6f, 6.6f, 10.4f}, {0, 0.1f, 0}, {0, 1, 0}, 41};
   finish(scene, {0, 1, 0}, true);
   return scene;
 }
