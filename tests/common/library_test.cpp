@@ -585,14 +585,14 @@ TEST_CASE("launcher: an interrupted fetch leaves nothing, and the next begins an
   house.state("slow", true);
   const Result stopped = house.trilha("assets bunny", 1.0);
   INFO(stopped.err);
-  CHECK(stopped.code == 130);
+  CHECK((stopped.code == 130 || stopped.code == -SIGINT));  // the latter where it had hardly begun
   CHECK(house.kept().empty());
   fs::create_directories(house.cache / ".fetch-bunny.killed/files");  // what a SIGKILL leaves
   write(house.cache / ".fetch-bunny.killed/files/bunny.obj", "half");
   const std::string one =
       "env -i TRILHA_FAKES=\"$PWD\" PATH=\"$PWD/bin\" \"$PWD/a house/trilha\" assets bunny";
   const std::size_t before = house.calls("download");
-  const Result both = house.shell(one + " & " + one + " & wait %1 && wait %2");
+  const Result both = house.shell(one + " & first=$!; " + one + " & second=$!; wait $first && wait $second");
   INFO(both.err);
   CHECK(both.code == 0);
   CHECK(house.calls("download") == before + 1);
