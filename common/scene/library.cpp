@@ -39,15 +39,21 @@ struct Portrait {
   float distance;  ///< of the eye from the middle, in diagonals of the bounds
 };
 
+constexpr vec3 y_up{0, 1, 0}, z_up{0, 0, 1};
+
 constexpr Portrait portraits[] = {
-    {"bunny", "the Stanford bunny", {0, 1, 0}, {-0.42f, 0.3f, 0.86f}, 1.25f},  // its face turned to us
-    {"dragon", "the Stanford dragon", {0, 1, 0}, {0.35f, 0.25f, 0.9f}, 1.25f},
-    {"dragon_res2", "the same, decimated", {0, 1, 0}, {0.35f, 0.25f, 0.9f}, 1.25f},
-    {"dragon_res3", "the same, decimated twice", {0, 1, 0}, {0.35f, 0.25f, 0.9f}, 1.25f},
-    {"dragon_res4", "the same, decimated thrice", {0, 1, 0}, {0.35f, 0.25f, 0.9f}, 1.25f},
-    {"elephant", "an elephant", {0, 1, 0}, {0.5f, 0.3f, 0.86f}, 1.3f},
-    {"armadillo", "the Stanford armadillo, coarse", {0, 1, 0}, {0.3f, 0.2f, -0.9f}, 1.3f},
-    {"cgal_bunny", "the Stanford bunny, without holes", {0, 1, 0}, {-0.42f, 0.3f, 0.86f}, 1.25f},
+    {"bunny", "the Stanford bunny", y_up, {-0.42f, 0.3f, 0.86f}, 1.25f},  // its face turned to us
+    {"dragon", "the Stanford dragon", y_up, {0.35f, 0.25f, 0.9f}, 1.25f},
+    {"dragon_res2", "the same, decimated", y_up, {0.35f, 0.25f, 0.9f}, 1.25f},
+    {"dragon_res3", "the same, decimated twice", y_up, {0.35f, 0.25f, 0.9f}, 1.25f},
+    {"dragon_res4", "the same, decimated thrice", y_up, {0.35f, 0.25f, 0.9f}, 1.25f},
+    {"armadillo", "the Stanford armadillo, coarse", y_up, {0.3f, 0.2f, -0.9f}, 1.3f},
+    {"cgal_bunny", "the Stanford bunny, without holes", y_up, {-0.42f, 0.3f, 0.86f}, 1.25f},
+    {"elephant", "an elephant on one leg", y_up, {0.5f, 0.3f, 0.86f}, 1.3f},
+    {"opensubdiv/catmark_bishop", "a chessman's cage", z_up, {0.5f, -0.86f, 0.36f}, 1.4f},
+    {"opensubdiv/catmark_car", "a car's cage", z_up, {0.5f, -0.86f, 0.36f}, 1.4f},
+    {"opensubdiv/catmark_pawn", "a chessman's cage", z_up, {0.5f, -0.86f, 0.36f}, 1.4f},
+    {"opensubdiv/catmark_rook", "a chessman's cage", z_up, {0.5f, -0.86f, 0.36f}, 1.4f},
 };
 
 const Portrait* portrait_of(const std::string& scene) {
@@ -192,7 +198,7 @@ Scene under_sky(const fs::path& file, const LoadOptions& options) {
 
   Mesh table;
   table.name = "table";
-  table.positions = {{-5, 0, -3}, {-5, 0, 3}, {5, 0, 3}, {5, 0, -3}};
+  table.positions = {{-6, 0, -4}, {-6, 0, 6}, {6, 0, 6}, {6, 0, -4}};
   table.normals.assign(4, vec3(0, 1, 0));
   table.triangles = {{0, 1, 2}, {0, 2, 3}};
   scene.meshes.push_back(std::move(table));
@@ -207,7 +213,7 @@ Scene under_sky(const fs::path& file, const LoadOptions& options) {
   scene.environment.colour = vec3(1);
   scene.environment.file = file.filename().string();
   if (options.environment) scene.environment.image = as_light(read_image(file.string()));
-  scene.camera = {{0, 3.4f, 9}, {0, 0.75f, 0}, {0, 1, 0}, 32};
+  scene.camera = {{0, 3.8f, 10}, {0, 0.7f, 0}, {0, 1, 0}, 32};
   finish(scene, {0, 1, 0}, true);
   return scene;
 }
@@ -311,6 +317,7 @@ std::string grouped(std::size_t number) {
 
 std::string shown(double number) {
   std::ostringstream text;
+  text.precision(15);  // 10000000, not 1e+07
   text << number;
   return text.str();
 }
@@ -548,7 +555,7 @@ Scene load_scene(const std::string& name_or_file, const LoadOptions& options) {
 
   const std::vector<SceneEntry> entries = scene_table();
   const auto entry = std::find_if(entries.begin(), entries.end(), [&](const SceneEntry& e) {
-    return e.name == (name.empty() ? "bunny" : name);
+    return e.name == (name_or_file.empty() ? "bunny" : name);
   });
   if (name_or_file.empty()) {
     if (entry != entries.end() && entry->available) return load_entry(*entry, options);
