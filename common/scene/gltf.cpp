@@ -20,6 +20,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "common/error.h"
 #include "common/scene/json.h"
 #include "common/scene/text.h"
 
@@ -366,7 +367,11 @@ class File {
       std::error_code error;
       const auto [found, is_new] = files_.try_emplace(fs::weakly_canonical(file, error).string());
       if (is_new) {
-        found->second = read_bytes(file.string());
+        try {
+          found->second = read_bytes(file.string());
+        } catch (const InputError& error) {  // which names that file alone
+          buffer->refuse_key("uri", std::string("names what is not there to read: ") + error.what());
+        }
         size_ += found->second.size();
       }
       bytes = found->second;

@@ -1076,6 +1076,7 @@ TEST_CASE("hostile glTF is refused with its key's line") {
       {"/buffers/0/uri", "a%00b", "control character"},
       {"/buffers/0/uri", "a%0ab", "control character"},
       {"/buffers/0/uri", "", "empty"},
+      {"/buffers/0/uri", "absent.bin", "absent.bin: no such file"},
       {"/buffers/0/uri", 3, "takes text"},
       {"/materials/0/pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1}}}, "takes a list of 4 numbers"},
       {"/materials/0/pbrMetallicRoughness", {{"baseColorFactor", {1, 2, 1, 1}}}, "go from 0"},
