@@ -158,10 +158,7 @@ float parse_float(std::string_view word, const std::string& path, std::size_t li
   return parsed<float>(word, path, line);
 }
 
-TextFile::TextFile(const std::string& path) : path_(path) {
-  std::size_t size = 0;
-  file_ = open_file(path, size);
-}
+TextFile::TextFile(const std::string& path) : path_(path) { file_ = open_file(path, size_); }
 
 std::size_t TextFile::read(char* to, std::size_t room) {
   file_.read(to, static_cast<std::streamsize>(room));
@@ -187,7 +184,8 @@ bool Statements::more() {
   if (after_ != end_of_text_) return true;
   if (file_ == nullptr) return false;
   // The statement so far goes to the front of the block, which grows where it takes half of it.
-  constexpr std::size_t least = std::size_t{1} << 18, most = std::size_t{1} << 24;
+  constexpr std::size_t usual = std::size_t{1} << 18, most = std::size_t{1} << 24;
+  const std::size_t least = std::min(usual, file_->size() + 1);
   const auto kept = static_cast<std::size_t>(end_of_text_ - cursor_);
   const auto end = static_cast<std::size_t>(end_ - cursor_);
   if (kept == most)

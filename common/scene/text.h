@@ -45,6 +45,7 @@ class TextFile {
   explicit TextFile(const std::string& path);
 
   const std::string& path() const { return path_; }
+  std::size_t size() const { return size_; }  ///< bytes, when it was opened
 
   /// The next `room` bytes or, at the end of the file, fewer. Throws InputError where bytes are among them
   /// that no text has, or cannot be read.
@@ -53,6 +54,7 @@ class TextFile {
  private:
   std::string path_;
   std::ifstream file_;
+  std::size_t size_ = 0;
   std::size_t lines_ = 0;  // that were read
 };
 
