@@ -29,8 +29,7 @@ struct BlockReader::Unpacker {
   Unpacker& operator=(const Unpacker&) = delete;
 };
 
-BlockReader::BlockReader(const std::string& path)
-    : path_(path), file_(open_file(path, size_)), memory_(block), begin_(memory_.data()), end_(begin_) {
+BlockReader::BlockReader(const std::string& path) : path_(path), file_(open_file(path, size_)) {
   char first[6]{};
   file_.read(first, sizeof(first));
   const std::string_view start(first, static_cast<std::size_t>(file_.gcount()));
@@ -47,6 +46,8 @@ BlockReader::BlockReader(const std::string& path)
       refuse(path, 0, "is packed by "s + packer + "; unpack it first, only gzip is unpacked here");
   }
   if (start.starts_with("\x1f\x8b"sv)) unpacker_ = std::make_unique<Unpacker>();
+  memory_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(block, most_left() + 1)));
+  begin_ = end_ = memory_.data();
 }
 
 BlockReader::~BlockReader() = default;

@@ -63,8 +63,8 @@ class BlockReader {
   std::uint64_t produced_ = 0;  // bytes that reached the memory
   std::ifstream file_;
   std::vector<char> memory_;
-  const char* begin_;
-  const char* end_;
+  const char* begin_ = nullptr;
+  const char* end_ = nullptr;
   std::unique_ptr<Unpacker> unpacker_;  // none where the file is plain
 };
 

@@ -247,8 +247,7 @@ class HeaderReader {
         least += ascii ? 2 : info(property.count.value_or(property.type)).size;
       if (least > 0 && element.count > left / least)
         refuse_it(std::to_string(element.count) + " times " + in_quotes(element.name) + " take at least " +
-                  counted(least, "byte") + " each; the file has " + std::to_string(left) +
-                  " left for them");
+                  counted(least, "byte") + " each; the file has " + std::to_string(left) + " left for them");
       left -= least * element.count;
       if (element.count == 0) continue;
       if (element.kind == Kind::vertex) {
@@ -273,7 +272,8 @@ class HeaderReader {
 };
 
 std::string place(const Element& element, std::uint64_t i) {
-  return element.name + " " + std::to_string(i + 1) + " of " + std::to_string(element.count);
+  return (element.kind == Kind::other ? in_quotes(element.name) : element.name) + " " +
+         std::to_string(i + 1) + " of " + std::to_string(element.count);
 }
 
 // The data: the same walk over it whatever it is written in.

@@ -652,7 +652,7 @@ TEST_CASE("PLY: a header that promises more than the file can hold is refused be
                 "vertex 166667 of 170000: the file ends here");
   check_refused(
       packed(binary("element junk 1\nproperty list uint double a\n" + v + f, "\xff\xff\xff\xff" + zeros)), 0,
-      "junk 1 of 1: the file ends here");
+      "'junk' 1 of 1: the file ends here");
   const std::size_t after = peak_memory_since_last_call();
   if (after > 0) CHECK(after < before + 16'000'000);  // 2 MB of zeros, a few times, and 150 000 vertices
 }
