@@ -395,6 +395,38 @@ TEST_CASE("includes bring meshes, materials, bodies, lights and views, at their 
   CHECK(views == std::set<std::string>{"inner", "inner/v", "again", "again/v", "triangle"});
 }
 
+// Catches: lights or bodies that come through a file between; the inner of two overrides; the last ambient
+// light.
+TEST_CASE("what an include does not take, does not come through the files in it") {
+  const Folder folder;
+  furnish(folder);
+  write(folder / "dark.json", R"({"ambient": [0.5, 0, 0], "materials": [{"name": "d"}]})");
+  write(
+      folder / "between.json",
+      R"({"materials": [{"name": "b"}], "include": [{"file": "inner.json", "material": "b"}, {"file": "dark.json"}]})");
+  write(folder / "scene.json", R"({"materials": [{"name": "a"}],
+    "include": [{"file": "between.json", "geometry_only": true, "material": "a"}],
+    "meshes": [{"name": "mesh", "file": "between.json"}], "instances": [{"mesh": "mesh", "transform": [{"scale": 2}]}]})");
+  const Scene scene = load_scene_file(folder / "scene.json");
+  CHECK(scene.lights.empty());
+  CHECK(scene.views.empty());
+  CHECK(scene.ambient == vec3(0));
+  CHECK(scene.environment.colour == vec3(0));
+  REQUIRE(scene.spheres.size() == 1);
+  CHECK(scene.planes.size() == 1);
+  CHECK(scene.materials[scene.spheres[0].material].name == "a");
+  CHECK(scene.warnings.size() == 1);  // a mesh has no spheres
+  REQUIRE(scene.instances.size() == 2);
+  std::set<std::string> materials;
+  for (const Instance& i : scene.instances)
+    materials.insert(scene.materials.at(std::size_t(i.material)).name);
+  CHECK(materials == std::set<std::string>{"a", "b"});
+  write(folder / "scene.json", R"({"include": [{"file": "between.json"}]})");
+  const Scene whole = load_scene_file(folder / "scene.json");
+  CHECK(whole.ambient == vec3(0.25f, 0, 0));  // the first's
+  CHECK(whole.lights.at(0).name == "between/inner/l");
+}
+
 // Catches: a mirrored plane or light that faces the other way; a normal multiplied like a point.
 TEST_CASE("planes under any transform still hold the points that they held") {
   Random random(4, 0);
