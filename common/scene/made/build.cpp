@@ -64,7 +64,7 @@ Path straight(const dvec3& from, const dvec3& to, const dvec3& up) {
   const dvec3 tangent = (to - from) / length;
   const dvec3 across = glm::normalize(glm::cross(up, tangent));
   const dvec3 above = glm::cross(tangent, across);
-  return {{from, tangent, across, above, 0, dvec3(0)}, {to, tangent, across, above, length, dvec3(0)}};
+  return {{from, tangent, across, above, 0, 0}, {to, tangent, across, above, length, 0}};
 }
 
 Path ring(const dvec3& centre, double radius, const dvec3& x, const dvec3& y, int segments) {
@@ -72,8 +72,8 @@ Path ring(const dvec3& centre, double radius, const dvec3& x, const dvec3& y, in
   for (int i = 0; i <= segments; ++i) {
     const auto [cosine, sine] = turn(360.0 * i / segments);
     const dvec3 out = cosine * x + sine * y, tangent = cosine * y - sine * x;
-    path.push_back({centre + radius * out, tangent, glm::cross(-out, tangent), -out,
-                    2 * pi * radius * i / segments, dvec3(0)});
+    path.push_back(
+        {centre + radius * out, tangent, glm::cross(-out, tangent), -out, 2 * pi * radius * i / segments, 0});
   }
   return path;
 }
@@ -104,14 +104,19 @@ std::vector<double> Arch::lengths(int segments) const {
 std::vector<Path> Arch::paths(const dvec3& centre, const dvec3& along, int segments) const {
   const dvec3 y(0, 1, 0), across = glm::cross(along, y);
   const std::vector<double> length = lengths(segments);
+  // The halves meet in the plane of the apex. The shear that this takes there grows along the path: all of it
+  // in the last piece would fold it where pieces are short.
+  const dvec2 at_apex = point(1).tangent;
+  const double mitre = -at_apex.y / at_apex.x;
   Path left, right;
   for (int i = 0; i <= segments; ++i) {
-    const Point p = point(double(i) / segments);
-    const dvec3 cut = i == segments ? along : dvec3(0);  // the halves meet in the plane of the apex
+    const double t = double(i) / segments;
+    const Point p = point(t);
     left.push_back({centre - p.at.x * along + p.at.y * y, -p.tangent.x * along + p.tangent.y * y, across,
-                    -p.normal.x * along + p.normal.y * y, length[std::size_t(i)], cut});
+                    -p.normal.x * along + p.normal.y * y, length[std::size_t(i)], mitre * t});
     right.push_back({centre + p.at.x * along + p.at.y * y, -p.tangent.x * along - p.tangent.y * y, across,
-                     p.normal.x * along + p.normal.y * y, 2 * length.back() - length[std::size_t(i)], cut});
+                     p.normal.x * along + p.normal.y * y, 2 * length.back() - length[std::size_t(i)],
+                     -mitre * t});
   }
   std::reverse(right.begin(), right.end());
   return {left, right};
@@ -217,9 +222,7 @@ void MeshBuilder::sweep(const Path& path, const Profile& profile, const dvec2& p
     grid(int(piece.size()) - 1, int(path.size()) - 1, [&](int i, int j) {
       const CurvePoint& p = piece[std::size_t(i)];
       const PathNode& node = path[std::size_t(j)];
-      dvec3 offset = p.at.x * node.across + p.at.y * node.up;
-      if (node.cut != dvec3(0))
-        offset -= node.tangent * (glm::dot(node.cut, offset) / glm::dot(node.cut, node.tangent));
+      const dvec3 offset = p.at.x * node.across + p.at.y * node.up - node.shear * p.at.y * node.tangent;
       return Vertex{node.position + offset,
                     p.normal.x * node.across + p.normal.y * node.up,
                     {first_u + node.length / period.x, -p.length / period.y}};

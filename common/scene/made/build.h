@@ -51,7 +51,7 @@ class Profile {
 struct PathNode {
   dvec3 position, tangent, across, up;
   double length = 0;
-  dvec3 cut{0};  ///< normal of the plane in which the sweep ends here; zero: across the path
+  double shear = 0;  ///< what lies above the path by h is moved along it by −shear·h: for mitres
 };
 using Path = std::vector<PathNode>;
 
@@ -124,10 +124,10 @@ class MeshBuilder {
       }
   }
 
-  /// A curved surface at(s, t), s and t in [0, 1], with its normals from differences; texture coordinates are
-  /// (s, t)·uv.
-  template <class At>
-  void surface(int columns, int rows, const dvec2& uv, const At& at) {
+  /// A curved surface at(s, t), s and t in [0, 1], with texture coordinates uv(s, t) and its normals from
+  /// differences.
+  template <class At, class Uv>
+  void surface(int columns, int rows, const At& at, const Uv& uv) {
     // A central difference of step h errs by h²/6 of the third derivative and 2⁻⁵²/h of rounding.
     constexpr double step = 1e-5, away_from_edge = 1e-3;
     const auto inside = [](double x) {
@@ -137,8 +137,21 @@ class MeshBuilder {
       const double s = double(i) / columns, t = double(j) / rows;
       const double a = inside(s), b = inside(t);  // so that a side that is one point has a normal
       const dvec3 normal = glm::cross(at(a + step, b) - at(a - step, b), at(a, b + step) - at(a, b - step));
-      return Vertex{at(s, t), glm::normalize(normal), {s * uv.x, t * uv.y}};
+      return Vertex{at(s, t), glm::normalize(normal), uv(s, t)};
     });
+  }
+
+  /// A thin body: its front at(s, t, 1) and its back at(s, t, −1), which are the same along its edges. Both
+  /// are cut along the same diagonals, so that they do not cross however coarse they are; `back_columns` may
+  /// be fewer. Texture coordinates are (s, t)·uv, the back's mirrored.
+  template <class At>
+  void sheet(int columns, int rows, int back_columns, const dvec2& uv, const At& at) {
+    surface(
+        columns, rows, [&](double s, double t) { return at(s, t, 1.0); },
+        [&](double s, double t) { return dvec2(s * uv.x, t * uv.y); });
+    surface(
+        rows, back_columns, [&](double t, double s) { return at(s, t, -1.0); },
+        [&](double t, double s) { return dvec2((1 - s) * uv.x, t * uv.y); });
   }
 
   /// A parallelogram, counter-clockwise from `corner`; u along the first side, v along the second. The

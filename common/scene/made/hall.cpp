@@ -70,7 +70,7 @@ class Hall {
  private:
   /// How many pieces something is cut into that takes `usual` of them at detail 4.
   int pieces(double usual, int least = 1) const {
-    return std::max(least, static_cast<int>(std::floor(usual * detail_ / 4.75 + 0.5)));
+    return std::max(least, static_cast<int>(std::floor(usual * detail_ / 5.05 + 0.5)));
   }
   /// For what goes around and has to be as symmetrical as the square that stands on it.
   int pieces_around(double usual, double span = 360) const { return int(span / 90) * pieces(usual / 4, 2); }
@@ -211,12 +211,12 @@ Profile Hall::rib(double half_width, double depth) const {
   // A roll between two hollows, from right to left: the outside is on the right of the way.
   const int n = pieces(3);
   const double w = half_width, roll = 0.55 * w;
-  Profile profile({w, -0.04});
+  Profile profile({w, -1.6 * w});  // webs fall away from their groin: the back lies well behind
   profile.line({w, 0.3 * depth});
   profile.arc({roll, depth - 0.7 * roll}, -0.35, n);
   profile.arc({-roll, depth - 0.7 * roll}, 0.9, pieces(6));
   profile.arc({-w, 0.3 * depth}, -0.35, n);
-  profile.line({-w, -0.04});
+  profile.line({-w, -1.6 * w});
   return profile;
 }
 
@@ -225,29 +225,27 @@ void Hall::leaf(MeshBuilder& builder, double degrees, const dvec2 (&spine)[4], d
                 double thick, int columns, int rows) const {
   const auto [cosine, sine] = turn(degrees);
   const dvec3 out(sine, 0, cosine), right(cosine, 0, -sine);
-  const auto face = [&](double side) {
-    return [=](double across, double t) {
-      const double s = (2 * across - 1) * side, u = 1 - t;
-      const dvec2 point =
-          u * u * u * spine[0] + 3 * u * u * t * spine[1] + 3 * u * t * t * spine[2] + t * t * t * spine[3];
-      const dvec2 way =
-          u * u * (spine[1] - spine[0]) + 2 * u * t * (spine[2] - spine[1]) + t * t * (spine[3] - spine[2]);
-      const dvec2 normal = dvec2(way.y, -way.x) / glm::length(way);
-      const double lobe = 4.5 * t - std::floor(4.5 * t), edge = 4 * lobe * (1 - lobe);
-      const double t4 = t * t * t * t;
-      const double width = half_width * (1 - t4 * t4) * (0.74 + 0.26 * edge) * (0.85 + 0.6 * t * (1 - t));
-      const double body = 1 - s * s, rib = body * body * body * body;
-      const double bulge = side > 0
-                               ? thick * (0.75 * body + 0.7 * rib * rib + 0.5 * (edge - 0.5) * body * s * s)
-                               : -thick * 0.5 * body;
-      // The blade is arched: its edges lie on the bell.
-      const dvec2 at = point + (bulge * (1 - t4) - 0.22 * half_width * s * s * (1 - t4)) * normal;
-      const dvec3 flat = at.x * out + s * width * right;
-      return flat * (at.x / glm::length(flat)) + dvec3(0, at.y, 0);
-    };
+  const auto face = [&](double across, double t, double side) {
+    const double s = 2 * across - 1, u = 1 - t;
+    const dvec2 point =
+        u * u * u * spine[0] + 3 * u * u * t * spine[1] + 3 * u * t * t * spine[2] + t * t * t * spine[3];
+    const dvec2 way =
+        u * u * (spine[1] - spine[0]) + 2 * u * t * (spine[2] - spine[1]) + t * t * (spine[3] - spine[2]);
+    const dvec2 normal = dvec2(way.y, -way.x) / glm::length(way);
+    const double lobe = 4.5 * t - std::floor(4.5 * t), edge = 4 * lobe * (1 - lobe);
+    const double t4 = t * t * t * t;
+    const double width = half_width * (1 - t4 * t4) * (0.74 + 0.26 * edge) * (0.85 + 0.6 * t * (1 - t));
+    const double body = 1 - s * s, rib = body * body * body * body;
+    const double bulge = side > 0
+                             ? thick * (0.75 * body + 0.7 * rib * rib + 0.5 * (edge - 0.5) * body * s * s)
+                             : -thick * 0.5 * body;
+    // The blade is arched: its edges lie on the bell.
+    const dvec2 at = point + (bulge * (1 - t4) - 0.22 * half_width * s * s * (1 - t4)) * normal;
+    const dvec3 flat = at.x * out + s * width * right;
+    return flat * (at.x / glm::length(flat)) + dvec3(0, at.y, 0);
   };
-  builder.surface(columns, rows, {2 * half_width / 1.25, 4 * half_width / 1.25}, face(1));
-  builder.surface(std::max(1, columns / 2), rows, {2 * half_width / 1.25, 4 * half_width / 1.25}, face(-1));
+  builder.sheet(columns, rows, std::max(1, columns / 2), {2 * half_width / 1.25, 4 * half_width / 1.25},
+                face);
 }
 
 void Hall::make_columns() {
@@ -814,9 +812,9 @@ void Hall::make_gallery() {
   Profile side({0.05, top - 0.62});
   side = Profile({-0.72, top + 0.02});
   side.line({-0.72, top - 0.12})
-      .arc({-0.56, top - 0.22}, 0.6, pieces(4, 2))
+      .arc({-0.56, top - 0.22}, 0.35, pieces(4, 2))
       .arc({-0.14, top - 0.46}, -0.4, pieces(6, 2));
-  side.arc({-0.05, top - 0.6}, 0.6, pieces(4, 2)).line({0.05, top - 0.6});
+  side.arc({-0.05, top - 0.6}, 0.4, pieces(4, 2)).line({0.05, top - 0.6});
   const double half_width = 0.11;
   bracket.sweep(straight({-half_width, 0, 0}, {half_width, 0, 0}, {0, 1, 0}), side, {stone, stone});
   for (const double end_side : {-1.0, 1.0}) {
@@ -970,17 +968,13 @@ void Hall::make_furniture() {
   // Banners before the piers; thin, but with a front on both sides.
   MeshBuilder banner("banner");
   banner.material(of(HallTexture::cloth));
-  const auto cloth = [](double face) {
-    return [face](double across, double up) {
-      const double s = face > 0 ? across : 1 - across, t = 1 - up;
-      const double fold = turn(360 * (1.6 * s + 0.15 * t)).sine, wave = turn(360 * (0.45 * t + 0.2 * s)).sine;
-      const bool edge = s == 0 || s == 1 || t == 0 || t == 1;
-      const double z = 0.045 * (0.25 + 0.75 * t) * fold + 0.05 * t * wave + (edge ? 0 : face * 0.003);
-      return dvec3(1.1 * (s - 0.5) * (1 - 0.03 * t), -3.2 * t, z);
-    };
-  };
-  banner.surface(pieces(20, 5), pieces(26, 6), {1, 1}, cloth(1));
-  banner.surface(pieces(20, 5), pieces(26, 6), {1, 1}, cloth(-1));
+  banner.sheet(pieces(20, 5), pieces(26, 6), pieces(20, 5), {1, 1}, [](double s, double up, double face) {
+    const double t = 1 - up;
+    const double fold = turn(360 * (1.6 * s + 0.15 * t)).sine, wave = turn(360 * (0.45 * t + 0.2 * s)).sine;
+    const bool edge = s == 0 || s == 1 || t == 0 || t == 1;
+    const double z = 0.045 * (0.25 + 0.75 * t) * fold + 0.05 * t * wave + (edge ? 0 : face * 0.003);
+    return dvec3(1.1 * (s - 0.5) * (1 - 0.03 * t), -3.2 * t, z);
+  });
   banner.material(brass);
   Profile pole({0, 0});
   banner.sweep(straight({-0.68, 0.0, 0}, {0.68, 0.0, 0}, {0, 1, 0}), Profile::circle(0.022, pieces(8, 4)),

@@ -315,7 +315,7 @@ Texel mosaic(double u, double v) {
 
 Texel wood(double u, double v) {
   const double bend = clouds(u, v, 1, 3, 3, 131);
-  const double rings = fraction(v * 11 + bend * 1.6);
+  const double rings = fraction(v * 11 + bend * 1.6 + 0.37);
   const double fibre = noise(u, v, 4, 160, 132);
   const double late = smooth(0.1, 0.9, rings) * (1 - smooth(0.9, 1, rings));
   dvec3 colour = mixed(dvec3(0.52, 0.36, 0.23), dvec3(0.37, 0.235, 0.145), late);
@@ -326,7 +326,7 @@ Texel wood(double u, double v) {
 Texel cloth(double u, double v) {
   // One banner, 1.1 by 3.2 m: a border, and within lozenges with eight-pointed stars.
   const double x = u * 1.1, y = v * 3.2, edge = inside(x, y, 1.1, 3.2);
-  const dvec3 crimson(0.55, 0.13, 0.13), deep(0.36, 0.07, 0.09), gold(0.83, 0.65, 0.31);
+  const dvec3 crimson(0.59, 0.18, 0.17), deep(0.43, 0.16, 0.17), gold(0.83, 0.65, 0.31);
   const double px = fraction(x / 0.275 + 0.5) - 0.5, py = fraction(y / 0.4 + 0.5) - 0.5;
   const double lozenge = std::abs(px) + std::abs(py);
   dvec3 colour = mixed(crimson, deep, smooth(0.46, 0.49, lozenge));
