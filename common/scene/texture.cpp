@@ -392,8 +392,8 @@ std::int32_t TextureSet::add(const fs::path& file, const How& how, const std::st
     }
     if (!missing && fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status))
       throw InputError(label + " cannot be read: it is not a regular file; save the image to one");
-    Texture texture =
-        missing ? missing_texture(how.use) : decoded(label, image_bytes(file.string()), how.use, texels_so_far());
+    Texture texture = missing ? missing_texture(how.use)
+                              : decoded(label, image_bytes(file.string()), how.use, texels_so_far());
     texture.name = file.filename().string();
     return texture;
   });

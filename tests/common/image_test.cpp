@@ -304,6 +304,33 @@ TEST_CASE("EXR windows and channels") {
   }
 }
 
+// Catches: rows of a block or a tile that are lost where an image is decoded in strips; alpha taken for a
+// colour.
+TEST_CASE("EXR of every compression, in lines and in tiles") {
+  Folder folder;
+  const auto value = [](std::size_t channel, std::size_t i) {
+    return channel == 3 ? 0.5f : static_cast<float>(i % 64) / 64 + static_cast<float>(channel);
+  };
+  for (const Imf::Compression compression :
+       {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION, Imf::ZIP_COMPRESSION,
+        Imf::PIZ_COMPRESSION, Imf::PXR24_COMPRESSION, Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION,
+        Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION})
+    for (const unsigned tiles : {0u, 32u})
+      for (const bool wide : {false, true}) {  // 2²⁰ / 5000 rows are a strip
+        const int width = wide ? 5000 : 70, height = wide ? 301 : 45;
+        if (wide && compression != Imf::DWAB_COMPRESSION && compression != Imf::NO_COMPRESSION) continue;
+        write_exr(folder / "a.exr", {"R", "G", "B", "A"}, -3, 11, width, height, compression, tiles, value);
+        const Image image = read_image(folder / "a.exr");
+        INFO("compression " << int(compression) << ", tiles " << tiles << ", width " << width);
+        REQUIRE((image.width == width && image.height == height));
+        float worst = 0;
+        for (std::size_t i = 0; i < image.pixels.size(); ++i)
+          for (int c = 0; c < 3; ++c)
+            worst = std::max(worst, std::fabs(image.pixels[i][c] - value(static_cast<std::size_t>(c), i)));
+        CHECK(worst < (compression >= Imf::DWAA_COMPRESSION ? 0.1f : 1e-3f));
+      }
+}
+
 // Catches: a refusal that does not say what is wrong, or is no InputError; memory taken on a header's word.
 TEST_CASE("what is no image is refused in one line") {
   Folder folder;

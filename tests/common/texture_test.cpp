@@ -529,4 +529,13 @@ TEST_CASE("what is cut short or damaged is refused") {
     read += accepted;
   }
   CHECK(read == 0);
+  // where libpng only warns: a chunk that is whole, of data whose own sum is wrong, or more of it than fits
+  std::string data_of_it = deflated(std::string("\0ab", 3));
+  const auto two = [&](const std::string& deflate) {
+    return png_header(2, 1, 8, 0) + png_chunk("IDAT", deflate) + png_chunk("IEND", "");
+  };
+  CHECK_NOTHROW(set.from(two(data_of_it)));
+  data_of_it.back() = static_cast<char>(data_of_it.back() ^ 1);
+  CHECK(refusal([&] { set.from(two(data_of_it)); }).find("IDAT") != std::string::npos);
+  CHECK(refusal([&] { set.from(two(deflated(std::string("\0abc", 4)))); }).find("IDAT") != std::string::npos);
 }
