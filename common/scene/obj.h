@@ -10,15 +10,14 @@ namespace trilha {
 /// mesh for every object and group that has faces, polygons split into triangles, normals and texture
 /// coordinates where the file gives them, the materials that are used, and a camera that sees everything,
 /// with y up. Vertices stand in the order of their first use, numbers are rounded once, to the nearest float.
-/// The file is read in blocks; at the peak, memory is less than three times what the scene takes.
+/// The file is read in blocks: where it is large, loading takes about twice the memory of the scene.
 ///
 /// Beyond the format (Alias|Wavefront 1995, "Object Files") the statements by which Micah Taylor's objLoader
 /// extends it, and which the system of Ordeix & Cioli (2010) reads its scenes from. They use indices of v and
 /// vn as faces do, and the material in force; readers that do not know them pass over them:
 ///
-///     c  v v vn     a camera: where it stands, what it looks at, what is up. The first becomes
-///     Scene::camera,
-///                   the others Scene::views. Its field of view is the default.
+///     c  v v vn     a camera: where it stands, what it looks at, what is up. The first is Scene::camera, the
+///                   others become Scene::views. Its field of view is the default.
 ///     lp v          a point light. Its intensity is the Kd of the material in force, or its Ke where that is
 ///                   not black; without a material 1.
 ///     pl v vn [vn]  an unbounded plane through a point; the second vector would turn a texture on it.
