@@ -105,7 +105,6 @@ class Colours : public ImageSink {
                        std::to_string(most_side) + ", both together to " + std::to_string(most_pixels) +
                        " pixels");
     image = {static_cast<int>(width), static_cast<int>(height), header.encoding, {}};
-    image.pixels.reserve(static_cast<std::size_t>(width * height));
   }
   void row(const u8vec4* texels) override { append(texels, 255.0f); }
   void row(const u16vec4* texels) override { append(texels, 65535.0f); }
@@ -116,6 +115,8 @@ class Colours : public ImageSink {
  private:
   template <class Texel>
   void append(const Texel* texels, float most) {
+    if (image.pixels.empty())  // by now a row has been decoded
+      image.pixels.reserve(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
     for (int x = 0; x < image.width; ++x)
       image.pixels.push_back(vec3(texels[x].x, texels[x].y, texels[x].z) / most);
   }

@@ -207,14 +207,11 @@ class Texels : public ImageSink {
     check(header);
     colour_ = texture_.use == TextureUse::colour;
     to_straight_ = colour_ && header.premultiplied;
-    TextureLevel level{static_cast<int>(header.width), static_cast<int>(header.height), {}, {}};
-    const std::size_t count = area(level.width, level.height);
-    header.depth == ImageHeader::Depth::bytes ? level.bytes.reserve(count) : level.floats.reserve(count);
-    texture_.levels.assign(1, std::move(level));
+    texture_.levels = {{static_cast<int>(header.width), static_cast<int>(header.height), {}, {}}};
   }
 
   void row(const u8vec4* texels) override {
-    TextureLevel& level = texture_.levels[0];
+    TextureLevel& level = with_room(&TextureLevel::bytes);
     level.bytes.insert(level.bytes.end(), texels, texels + level.width);
   }
 
@@ -224,7 +221,7 @@ class Texels : public ImageSink {
       for (std::size_t i = 0; i < result.size(); ++i) result[i] = srgb_decoded(static_cast<float>(i) / 65535);
       return result;
     }();
-    TextureLevel& level = texture_.levels[0];
+    TextureLevel& level = with_room(&TextureLevel::floats);
     for (int x = 0; x < level.width; ++x) {
       vec4 texel = vec4(texels[x]) / 65535.0f;
       for (int c = 0; c < 3 && colour_; ++c) texel[c] = light[texels[x][c]];
@@ -233,7 +230,7 @@ class Texels : public ImageSink {
   }
 
   void row(const vec4* texels) override {
-    TextureLevel& level = texture_.levels[0];
+    TextureLevel& level = with_room(&TextureLevel::floats);
     for (int x = 0; x < level.width; ++x) {
       vec4 texel = texels[x];
       if (to_straight_ && texel.w > 0 && texel.w < 1) texel = vec4(vec3(texel) / texel.w, texel.w);
@@ -246,6 +243,14 @@ class Texels : public ImageSink {
   }
 
  private:
+  /// The level, with room for all of its texels: when the first row is decoded, and not on a header's word.
+  template <class T>
+  TextureLevel& with_room(std::vector<T> TextureLevel::*texels) {
+    TextureLevel& level = texture_.levels[0];
+    if ((level.*texels).empty()) (level.*texels).reserve(area(level.width, level.height));
+    return level;
+  }
+
   [[noreturn]] void refuse(const std::string& what) const {
     throw InputError(label_ + " cannot be read: " + what);
   }
