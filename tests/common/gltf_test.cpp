@@ -1164,6 +1164,8 @@ TEST_CASE("numbers in buffers are not believed either") {
   model.json["meshes"][0]["primitives"][0]["indices"] =
       model.accessor(std::vector<std::uint32_t>{0, 1, 2, 4294967295, 0, 1});
   check_refused(model.glb(), "has 4294967295 as index 3; it has 3 positions");
+  model.json["meshes"][0]["primitives"][0]["indices"] = model.accessor(std::vector<std::uint8_t>{0, 1, 3});
+  check_refused(model.glb(), "has 3 as index 2; it has 3 positions");
 
   for (const auto& [places, words] :
        {std::pair(std::vector<std::uint8_t>{0, 3}, "name element 3; there are 3"),
