@@ -247,9 +247,8 @@ std::int64_t TextReader::whole(const char* what) {
   if (*at == '-' || *at == '+') ++at;
   const char* const first = at;
   std::int64_t value = 0;
-  for (; at != end && *at >= '0' && *at <= '9' && at - first <= 18; ++at) value = 10 * value + (*at - '0');
-  if (at == first || at - first > 18 ||
-      !(at == end || is_space(*at) || is_line_break(*at) || *at == comment_)) {
+  for (; at != end && *at >= '0' && *at <= '9' && at - first < 18; ++at) value = 10 * value + (*at - '0');
+  if (at == first || !(at == end || is_space(*at) || is_line_break(*at) || *at == comment_)) {
     refuse_here(in_quotes(word()) + " is not " + what + "; a whole number of at most 18 digits is wanted");
   }
   bytes_.move_to(at);

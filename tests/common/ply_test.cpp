@@ -383,7 +383,8 @@ TEST_CASE("PLY: blocks may end anywhere") {
   const Scene expected = loaded(written(tables, Format::little));
   const Folder folder;
   for (const Format format : {Format::ascii, Format::little}) {
-    const std::size_t size = written(tables, format, "", "\r\n").size();
+    const std::string whole = written(tables, format, "", "\r\n");
+    const std::size_t size = whole.size() - whole.find("end_header");
     bool all = true;
     for (std::size_t i = 0; i <= size; ++i) {
       write_anew(folder / "test.ply",
