@@ -157,6 +157,21 @@ void MeshBuilder::triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
   mesh_.materials.push_back(material_);
 }
 
+void MeshBuilder::drop_flat_corners(int columns, int rows, std::size_t first_triangle,
+                                    std::size_t first_vertex) {
+  const auto on_edge = [&](std::uint32_t vertex) {
+    const int number = int(vertex - first_vertex), i = number % (columns + 1), j = number / (columns + 1);
+    return i == 0 || i == columns || j == 0 || j == rows;
+  };
+  std::size_t kept = first_triangle;
+  for (std::size_t k = first_triangle; k < mesh_.triangles.size(); ++k) {
+    const uvec3 t = mesh_.triangles[k];
+    if (!(on_edge(t.x) && on_edge(t.y) && on_edge(t.z))) mesh_.triangles[kept++] = t;
+  }
+  mesh_.triangles.resize(kept);
+  mesh_.materials.resize(kept, material_);
+}
+
 void MeshBuilder::quad(const dvec3& corner, const dvec3& side_u, const dvec3& side_v, double period,
                        const dvec2& first_uv) {
   const dvec3 normal = glm::normalize(glm::cross(side_u, side_v));

@@ -146,12 +146,18 @@ class MeshBuilder {
   /// be fewer. Texture coordinates are (s, t)·uv, the back's mirrored.
   template <class At>
   void sheet(int columns, int rows, int back_columns, const dvec2& uv, const At& at) {
+    const bool alike = back_columns == columns;
+    std::size_t first = mesh_.triangles.size(), vertices = mesh_.positions.size();
     surface(
         columns, rows, [&](double s, double t) { return at(s, t, 1.0); },
         [&](double s, double t) { return dvec2(s * uv.x, t * uv.y); });
+    if (alike) drop_flat_corners(columns, rows, first, vertices);
+    first = mesh_.triangles.size();
+    vertices = mesh_.positions.size();
     surface(
         rows, back_columns, [&](double t, double s) { return at(s, t, -1.0); },
         [&](double t, double s) { return dvec2((1 - s) * uv.x, t * uv.y); });
+    if (alike) drop_flat_corners(rows, back_columns, first, vertices);
   }
 
   /// A parallelogram, counter-clockwise from `corner`; u along the first side, v along the second. The
@@ -194,6 +200,10 @@ class MeshBuilder {
   Mesh take();
 
  private:
+  /// Leaves out what of the net last added lies on its edges with all three corners: front and back of a
+  /// sheet have these in the same place.
+  void drop_flat_corners(int columns, int rows, std::size_t first_triangle, std::size_t first_vertex);
+
   Mesh mesh_;
   std::uint32_t material_ = 0;
 };

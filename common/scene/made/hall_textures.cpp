@@ -102,7 +102,7 @@ Texel limestone(double u, double v) {
   dvec3 colour = mixed(stone(u, v, 11), cream, 0.45);
   colour *= 0.97 + 0.05 * bands;
   const double pit = smooth(0.72, 0.85, noise(u, v, 60, 60, 5)) * smooth(0.5, 0.7, noise(u, v, 9, 9, 6));
-  return {mixed(colour, shade, 0.5 * pit), -0.0015 * pit};
+  return {mixed(colour, shade, 0.28 * pit), -0.0015 * pit};
 }
 
 Texel ashlar(double u, double v) {
