@@ -169,26 +169,33 @@ Tree full_scene() {
   return Tree::parse(R"({
     "name": "all", "up": [0, 0, 1],
     "include": [
-      {"name": "i", "file": "inner.json", "transform": [{"rotate": [0, 0, 1], "degrees": 90}], "material": "m", "geometry_only": true},
+      {"name": "i", "file": "inner.json", "transform": [{"rotate": [0, 0, 1], "degrees": 90}],
+        "material": "m", "geometry_only": true},
       {"name": "made", "made": "teapot"}],
-    "materials": [{"name": "m", "diffuse": [0.1, 0.2, 0.3], "specular": [0.1, 0.2, 0.3], "shininess": 3, "emission": [1, 2, 3],
-      "reflection": [0.1, 0.2, 0.3], "transmission": [0.1, 0.2, 0.3], "absorption": [1, 2, 3], "refraction_index": 1.3,
+    "materials": [{"name": "m", "diffuse": [0.1, 0.2, 0.3], "specular": [0.1, 0.2, 0.3], "shininess": 3,
+        "emission": [1, 2, 3],
+      "reflection": [0.1, 0.2, 0.3], "transmission": [0.1, 0.2, 0.3], "absorption": [1, 2, 3],
+        "refraction_index": 1.3,
       "roughness": 0.3, "metallic": 0.4, "opacity": 0.5, "alpha_cutoff": 0.6, "bump_scale": 2,
-      "diffuse_map": {"file": "a.png", "wrap": "mirror", "use": "colour", "scale": [2, 3], "offset": [0.5, 0.25]},
+      "diffuse_map": {"file": "a.png", "wrap": "mirror", "use": "colour", "scale": [2, 3], "offset": [0.5,
+        0.25]},
       "specular_map": {"file": "a.png"}, "emission_map": {"file": "a.png"}, "normal_map": {"file": "a.png"},
       "bump_map": {"file": "a.png", "channel": "green"}, "opacity_map": {"file": "a.png", "channel": "alpha"},
       "roughness_map": {"file": "a.png"}, "metallic_map": {"file": "a.png"}}],
     "meshes": [
-      {"name": "t", "positions": [0,0,0, 1,0,0, 0,1,0], "triangles": [0,1,2], "normals": [0,0,2, 0,0,2, 0,0,2],
+      {"name": "t", "positions": [0,0,0, 1,0,0, 0,1,0], "triangles": [0,1,2], "normals": [0,0,2, 0,0,2,
+        0,0,2],
        "texture_coordinates": [0,0, 1,0, 0,1], "material": "m"},
       {"name": "f", "file": "triangle.obj"}, {"name": "g", "made": "teapot"}],
-    "instances": [{"mesh": "t", "material": "m", "transform": [{"translate": [1, 2, 3]}, {"rotate": [1, 1, 0], "degrees": 30},
+    "instances": [{"mesh": "t", "material": "m", "transform": [{"translate": [1, 2, 3]}, {"rotate": [1, 1,
+        0], "degrees": 30},
       {"scale": [1, -2, 3]}, {"shear": {"xy": 1, "xz": 0.5, "yx": 0.25, "yz": 0.125, "zx": 0.5, "zy": 0.25}},
       {"matrix": [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7]]}]}, {"mesh": "i/t"}],
     "spheres": [{"centre": [1, 2, 3], "radius": 4, "material": "m"}],
     "planes": [{"normal": [0, 3, 4], "offset": 10, "material": "m"}],
     "lights": [
-      {"name": "s", "kind": "spot", "position": [1, 2, 3], "direction": [0, 0, -2], "intensity": [4, 5, 6], "attenuation": [1, 2, 3],
+      {"name": "s", "kind": "spot", "position": [1, 2, 3], "direction": [0, 0, -2], "intensity": [4, 5, 6],
+        "attenuation": [1, 2, 3],
        "range": 7, "inner_angle": 8, "outer_angle": 9},
       {"kind": "point", "position": [1, 2, 3]}, {"kind": "directional", "direction": [0, -1, 0]}],
     "ambient": [0.1, 0.2, 0.3],
@@ -401,12 +408,13 @@ TEST_CASE("what an include does not take, does not come through the files in it"
   const Folder folder;
   furnish(folder);
   write(folder / "dark.json", R"({"ambient": [0.5, 0, 0], "materials": [{"name": "d"}]})");
-  write(
-      folder / "between.json",
-      R"({"materials": [{"name": "b"}], "include": [{"file": "inner.json", "material": "b"}, {"file": "dark.json"}]})");
+  write(folder / "between.json",
+        R"({"materials": [{"name": "b"}], "include": [{"file": "inner.json", "material": "b"},
+        {"file": "dark.json"}]})");
   write(folder / "scene.json", R"({"materials": [{"name": "a"}],
     "include": [{"file": "between.json", "geometry_only": true, "material": "a"}],
-    "meshes": [{"name": "mesh", "file": "between.json"}], "instances": [{"mesh": "mesh", "transform": [{"scale": 2}]}]})");
+    "meshes": [{"name": "mesh", "file": "between.json"}], "instances": [{"mesh": "mesh",
+        "transform": [{"scale": 2}]}]})");
   const Scene scene = load_scene_file(folder / "scene.json");
   CHECK(scene.lights.empty());
   CHECK(scene.views.empty());
