@@ -262,7 +262,11 @@ class Reader {
       const Corner found = corner(word, 3);
       if (count < most_corners) corners_.push_back(found);
     }
-    if (count < 3) refuse_here("f with " + counted(count, "corner") + "; a face has at least 3");
+    if (count == 0) refuse_here("f with 0 corners; a face has at least 3");
+    if (count < 3) {  // modellers write the edges that they are left with
+      ++edges_;
+      return;
+    }
     if (count > most_corners)
       refuse_here("f with " + counted(count, "corner") + "; split it, 10000 are the most");
     triangle_count_ += count - 2;
@@ -457,6 +461,8 @@ class Reader {
   void warn(std::vector<std::string>& warnings) const {
     if (meshes.empty() && elements.empty())
       warnings.push_back(path_ + ": no faces in it: the scene is empty");
+    if (edges_ > 0)
+      warnings.push_back(path_ + ": " + counted(edges_, "face") + " with fewer than 3 corners left out");
     if (lines_ > 0) warnings.push_back(path_ + ": " + counted(lines_, "line") + " (l) ignored");
     if (points_ > 0) warnings.push_back(path_ + ": " + counted(points_, "point") + " (p) ignored");
     if (area_lights_ > 0)
@@ -479,7 +485,7 @@ class Reader {
   std::string object_;
   Names names_;  // of meshes
   std::size_t triangle_count_ = 0, vertex_count_ = 0;
-  std::size_t lines_ = 0, points_ = 0, area_lights_ = 0, others_ = 0, crossed_ = 0;
+  std::size_t lines_ = 0, edges_ = 0, points_ = 0, area_lights_ = 0, others_ = 0, crossed_ = 0;
   std::string first_other_;
   std::array<std::vector<ForwardReference>, 3> forward_;
   std::vector<Deferred> deferred_;

@@ -27,7 +27,7 @@ std::map<std::string, std::string> expected(const std::string& kind) {
   return result;
 }
 
-/// `names` may be in the line by any of these: an image's harm is also its material's.
+/// The refusal holds the file's name and the words.
 void check_refused(const Folder& folder, const std::string& arguments, const std::string& name,
                    const std::string& words) {
   const Result result =
@@ -62,6 +62,7 @@ void check_scenes(const std::string& kind, std::size_t at_least) {
 // Each catches: a reader that crashes, hangs, asks for memory that the file cannot fill, reads what it must
 // not, says nothing of where the harm is, or says it in more than a line.
 TEST_CASE("hostile OBJ files") { check_scenes("obj", 12); }
+TEST_CASE("hostile material libraries") { check_scenes("mtl", 10); }
 TEST_CASE("hostile PLY files") { check_scenes("ply", 16); }
 TEST_CASE("hostile OFF files") { check_scenes("off", 8); }
 TEST_CASE("hostile glTF files") { check_scenes("gltf", 14); }

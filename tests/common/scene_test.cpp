@@ -197,7 +197,7 @@ TEST_CASE("hostile OBJ text is refused with its line") {
       {"vn 0 0 1 0\n", 1, "vn with 4 numbers"},
       {"vt\n", 1, "vt with 0 numbers"},
       {"vt 1 2 3 4\n", 1, "vt with 4 numbers"},
-      {triangle + "f 1 2\n", 4, "f with 2 corners"},
+      {triangle + "f\n", 4, "f with 0 corners"},
       {triangle + "f", 4, "f with 0 corners"},
       {"\n\nv 0 0 1.2e\n", 3, "'1.2e' is not a number"},
       {"v 0 0 1.0abc\n", 1, "'1.0abc' is not a number"},
@@ -510,15 +510,16 @@ TEST_CASE("materials come from the libraries beside the file, and what is missin
 }
 
 TEST_CASE("a file without faces is an empty scene that says so, and what is ignored is counted") {
-  const Scene scene = loaded(triangle + "l 1 2\nl 2 3 1\np 1\ncurv2 1 2\ns off\n");
+  const Scene scene = loaded(triangle + "l 1 2\nl 2 3 1\np 1\nf 1 2\ncurv2 1 2\ns off\n");
   CHECK(scene.meshes.empty());
   CHECK(scene.materials.size() == 1);
   CHECK(bounds(scene).empty());
   CHECK(warns_of(scene, "no faces"));
   CHECK(warns_of(scene, "2 lines (l) ignored"));
   CHECK(warns_of(scene, "1 point (p) ignored"));
-  CHECK(warns_of(scene, "1 unknown statement ignored, the first 'curv2' in line 7"));
-  CHECK(scene.warnings.size() == 4);
+  CHECK(warns_of(scene, "1 unknown statement ignored, the first 'curv2' in line 8"));
+  CHECK(warns_of(scene, "1 face with fewer than 3 corners left out"));
+  CHECK(scene.warnings.size() == 5);
 }
 
 TEST_CASE("normals that a file leaves out or gives without length are made from the faces") {
