@@ -511,6 +511,32 @@ TEST_CASE("shading of a sphere agrees with the sphere") {
   CHECK(hits > 500);
 }
 
+// Catches: a texture that is ignored, looked up, averaged as it is encoded, or that the diffuse colour does
+// not multiply.
+TEST_CASE("a textured surface shows its colour times the mean of its texture") {
+  Scene plain = scene_of(icosphere(3));
+  plain.materials[0].diffuse = vec3(1);
+  Scene textured = plain;
+  textured.materials[0].diffuse = vec3(0.5f, 1, 0.25f);
+  textured.textures.push_back(
+      make_texture("", 2, 1, {{0, 128, 255, 255}, {255, 128, 0, 255}}, TextureUse::colour));
+  textured.materials[0].diffuse_map.texture = 0;
+  textured.features = features_of(textured);
+  const double grey = srgb_decoded(128 / 255.0f);
+  const auto white = rendered(plain, {}, 32, 32, Backend::cpu);
+  const auto image = rendered(textured, {}, 32, 32, Backend::cpu);
+  int hits = 0;
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    if (white[i].x != white[i].z) continue;  // the sky, which is bluish
+    ++hits;
+    REQUIRE(image[i].x ==
+            Approx(0.25 * white[i].x).epsilon(0.01));  // half the texels are red: half the light
+    REQUIRE(image[i].y == Approx(grey * white[i].y).epsilon(0.01));
+    REQUIRE(image[i].z == Approx(0.125 * white[i].z).epsilon(0.01));
+  }
+  CHECK(hits > 100);
+}
+
 // Catches: something left out that the image needed, or nothing left out.
 TEST_CASE("what is left out changes no pixel and saves memory") {
   Mesh mesh = icosphere(3);

@@ -1,10 +1,12 @@
 #pragma once
 // Programs seen from outside: a folder to run them in, and what they print and return.
 
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -49,6 +51,8 @@ inline std::size_t lines(const std::string& text) {
 struct Result {
   int code;
   std::string out, err;
+  double seconds;
+  std::size_t bytes;  ///< of memory, at most
 };
 
 /// Runs a program in the folder; {} in the arguments stands for the folder. A signal may be sent after a
@@ -61,6 +65,7 @@ inline Result run(const std::string& program, const Folder& folder, std::string 
   const fs::path err = fs::temp_directory_path() / ("trilha_err" + std::to_string(getpid()));
   const std::string command = "cd '" + folder.path.string() + "' && exec '" + program + "' " + arguments +
                               " >" + out.string() + " 2>" + err.string();
+  const auto start = std::chrono::steady_clock::now();
   const pid_t child = fork();
   if (child == 0) {
     execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
@@ -71,8 +76,11 @@ inline Result run(const std::string& program, const Folder& folder, std::string 
     kill(child, SIGINT);
   }
   int status = 0;
-  waitpid(child, &status, 0);
-  Result result{WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), contents(out), contents(err)};
+  rusage usage{};
+  wait4(child, &status, 0, &usage);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  Result result{WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), contents(out), contents(err),
+                taken.count(), static_cast<std::size_t>(usage.ru_maxrss) * 1024};
   fs::remove(out);
   fs::remove(err);
   return result;

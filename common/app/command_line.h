@@ -28,10 +28,17 @@ struct Options {
   std::vector<std::string> sweeps;
   bool stability = false;
   bool explain = false, json = false, quiet = false, list_settings = false, list_scenes = false;
+  std::string listed;  ///< the scene or collection that --list-scenes names; empty for all
 };
 
 /// Reads the command line (and a --config file) into options, settings and the demo's heat map. Returns an
 /// exit code if the program is done, after --help say. Throws UsageError and InputError.
+///
+/// A --config file holds a flag a line: "name = value", or a name alone for "true"; '#' and ';' begin
+/// comments, quotes hold a value together, [a, b] is a list for what may be said more than once. What the
+/// command line says goes first. The file has at most 1 MiB and 1024 bytes a line. What is wrong with it,
+/// unknown names as well as wrong values, is an InputError (exit code 1) with file, line and name, for it was
+/// read, not typed.
 std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings& settings, Options& options);
 
 }  // namespace trilha

@@ -253,13 +253,6 @@ void print_json(const Demo& demo, const Settings& settings, const Scene& scene, 
   std::cout << all.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
 }
 
-void print_scenes() {
-  for (const SceneEntry& entry : scene_table())
-    std::cout << entry.name << std::string(std::max<int>(1, 12 - static_cast<int>(entry.name.size())), ' ')
-              << entry.what << (entry.available ? "" : " (not here: ./trilha assets " + entry.name + ")")
-              << "\n";
-}
-
 /// All backends that are there, or the one that was asked for.
 std::vector<Backend> backends_of(const Options& options) {
   if (options.backend) return {choose_backend(options)};
@@ -346,7 +339,11 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   demo.declare_settings(settings);
   if (const auto done = read_command_line(argc, argv, demo, settings, options)) return *done;
   if (options.list_scenes) {
-    print_scenes();
+    if (options.json)
+      std::cout << scenes_as_json(options.listed);
+    else
+      print_scenes(std::cout, options.listed);
+    check_output();
     return 0;
   }
   catch_interrupts();

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/math/random.h"
+#include "common/scene/made/turn.h"
 
 namespace trilha {
 namespace {
@@ -22,11 +23,10 @@ std::vector<vec3> placed(const std::vector<dvec3>& points, double scale, const d
 std::vector<dvec3> sphere_points(int slices, int stacks) {
   std::vector<dvec3> points{{0, 0, 1}};
   for (int i = 1; i < stacks; ++i) {
-    const double polar = pi * i / stacks;
+    const auto [height, radius] = turn(180.0 * i / stacks);
     for (int j = 0; j < slices; ++j) {
-      const double azimuth = 2 * pi * j / slices;
-      points.push_back(
-          {std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar)});
+      const auto [cosine, sine] = turn(360.0 * j / slices);
+      points.push_back({radius * cosine, radius * sine, height});
     }
   }
   points.push_back({0, 0, -1});
@@ -213,9 +213,9 @@ ExtremeTrial grazing(int width, int height) {
     const uvec3 t = trial.mesh.triangles[random.index(1280)];
     const dvec3 a(trial.mesh.positions[t.x]), b(trial.mesh.positions[t.y]), c(trial.mesh.positions[t.z]);
     const double u = random.uniform_double(), v = random.uniform_double() * (1 - u);
-    const double angle = 2 * pi * random.uniform_double();
+    const auto [cosine, sine] = turn(360 * random.uniform_double());
     const dvec3 e = glm::normalize(b - a), n = glm::normalize(glm::cross(b - a, c - a));
-    const dvec3 along = std::cos(angle) * e + std::sin(angle) * glm::cross(n, e);
+    const dvec3 along = cosine * e + sine * glm::cross(n, e);
     const dvec3 target = a + u * (b - a) + v * (c - a);
     const double tilt = 1e-7 * (2 * random.uniform_double() - 1);
     trial.rays.push_back(ray_to(target - 2.0 * (along + tilt * n), along + tilt * n));
@@ -289,9 +289,8 @@ ExtremeTrial one_centroid(int width, int height) {
     const dvec3 n = glm::normalize(dvec3(2 * x - 1, 2 * y - 1, 2 * z - 1));
     const dvec3 e = glm::normalize(glm::cross(n, std::fabs(n.x) < 0.5 ? dvec3(1, 0, 0) : dvec3(0, 1, 0)));
     for (int k = 0; k < 3; ++k) {
-      const double angle = 2 * pi * k / 3;
-      trial.mesh.positions.push_back(
-          vec3(size * 1.2 * (std::cos(angle) * e + std::sin(angle) * glm::cross(n, e))));
+      const auto [cosine, sine] = turn(120.0 * k);
+      trial.mesh.positions.push_back(vec3(size * 1.2 * (cosine * e + sine * glm::cross(n, e))));
     }
     trial.mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
   }

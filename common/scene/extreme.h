@@ -1,6 +1,6 @@
 #pragma once
 // Closed meshes whose true surface is known, at any size and place, and the stiff and extreme cases made of
-// them, which every structure and test of the course goes through.
+// them, which every structure and test of the course goes through. They have the same bits on any machine.
 
 #include <cstdint>
 #include <functional>

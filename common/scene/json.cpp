@@ -4,7 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <set>
+#include <numeric>
 #include <sstream>
 
 #include "common/scene/text.h"
@@ -26,14 +26,16 @@ class Cursor {
   struct Place {
     const char* last = nullptr;  // character read
     std::uint32_t line = 1;      // of `last`, which may already be beyond the token
-    bool beyond = false;         // `last` ended the line before
+    bool beyond = false;         // what follows `last` is on the next line
   };
 
   Cursor(const char* at, Place* place) : at_(at), place_(place) {}
   reference operator*() const {
     if (place_ != nullptr && place_->last != at_) {
       if (place_->beyond) ++place_->line;
-      place_->beyond = *at_ == '\n';
+      const bool ended = *at_ == '\n' && place_->last != nullptr && *place_->last == '\r';
+      if (ended) --place_->line;  // CR LF is one end of a line: LF still belongs to the line of CR
+      place_->beyond = *at_ == '\n' || *at_ == '\r';
       place_->last = at_;
     }
     return *at_;
@@ -63,13 +65,14 @@ class Builder {
 
   Json root;
 
-  bool null() { return add(Json::Kind::null, 0); }
-  bool boolean(bool value) { return add(Json::Kind::boolean, value ? 1 : 0); }
-  bool number_integer(number_integer_t value) { return add(Json::Kind::number, double(value)); }
-  bool number_unsigned(number_unsigned_t value) { return add(Json::Kind::number, double(value)); }
-  bool number_float(number_float_t value, const string_t&) { return add(Json::Kind::number, value); }
+  bool null() { return scalar(Json::Kind::null, 0); }
+  bool boolean(bool value) { return scalar(Json::Kind::boolean, value ? 1 : 0); }
+  bool number_integer(number_integer_t value) { return scalar(Json::Kind::number, double(value)); }
+  bool number_unsigned(number_unsigned_t value) { return scalar(Json::Kind::number, double(value)); }
+  bool number_float(number_float_t value, const string_t&) { return scalar(Json::Kind::number, value); }
   bool string(string_t& value) {
-    add(Json::Kind::text, 0)->text = std::move(value);
+    Json& json = add(Json::Kind::text, 0);
+    if (!value.empty()) json.contents = std::make_unique<Json::Contents>(Json::Contents{std::move(value)});
     return true;
   }
   bool binary(binary_t&) { return false; }
@@ -81,11 +84,19 @@ class Builder {
   }
   bool end_object() {
     // A list of keys is looked through at its end, when it is known how many there are.
-    const auto& members = open_.back()->contents->members;
-    std::set<std::string_view> keys;
-    for (const auto& [key, value] : members)
-      if (!keys.insert(key).second)
-        refuse(path_, value.line, "the key " + in_quotes(key) + " stands twice in one object; keep one");
+    const auto& members = open_.back()->members();
+    using Member = const std::pair<std::string, Json>*;
+    std::vector<Member> sorted(members.size());
+    std::iota(sorted.begin(), sorted.end(), members.data());
+    std::sort(sorted.begin(), sorted.end(), [](Member a, Member b) {
+      const int order = a->first.compare(b->first);
+      return order != 0 ? order < 0 : a < b;
+    });
+    const auto twice = std::adjacent_find(sorted.begin(), sorted.end(),
+                                          [](Member a, Member b) { return a->first == b->first; });
+    if (twice != sorted.end())
+      refuse(path_, twice[1]->second.line,
+             "the key " + in_quotes(twice[1]->first) + " stands twice in one object; keep one");
     open_.pop_back();
     return true;
   }
@@ -103,48 +114,59 @@ class Builder {
       if (static_cast<unsigned char>(c) < 32) c = '?';
     if (what.size() > 100) what = what.substr(0, 100) + "…";
     std::replace(what.begin(), what.end(), ';', ',');
-    refuse(path_, line(), "is no JSON: " + what + "; compare with what docs/scenes.md shows");
+    refuse(path_, line(), "is no JSON: " + what + "; a JSON text (RFC 8259) is wanted");
   }
 
  private:
   // Numbers end with a character that is beyond them; all else ends with its own last one.
   std::uint32_t line() const { return place_.line; }
 
-  struct Added {
-    Json* json;
-    Json::Contents* operator->() const { return json->contents.get(); }
-    operator bool() const { return true; }
-  };
+  bool scalar(Json::Kind kind, double number) {
+    add(kind, number);
+    return true;
+  }
 
-  Added add(Json::Kind kind, double number) {
+  Json& add(Json::Kind kind, double number) {
+    if (++values_ > most_json_values)
+      refuse(path_, line(),
+             "more than " + std::to_string(most_json_values) +
+                 " values; keep what is large in a model's file (.ply, .obj, .glb)");
     Json value;
     value.kind = kind;
     value.line = line();
     value.number = number;
-    if (kind >= Json::Kind::text) value.contents = std::make_unique<Json::Contents>();
     if (open_.empty()) {
       root = std::move(value);
-      return {&root};
+      return root;
     }
-    Json::Contents& parent = *open_.back()->contents;
-    if (open_.back()->kind == Json::Kind::list) {
-      parent.list.push_back(std::move(value));
-      return {&parent.list.back()};
+    Json& parent = *open_.back();
+    if (parent.kind == Json::Kind::list) {
+      auto& list = of<std::vector<Json>>(parent);
+      list.push_back(std::move(value));
+      return list.back();
     }
-    parent.members.emplace_back(std::move(key_), std::move(value));
-    return {&parent.members.back().second};
+    auto& members = of<std::vector<std::pair<std::string, Json>>>(parent);
+    members.emplace_back(std::move(key_), std::move(value));
+    return members.back().second;
+  }
+
+  template <class T>
+  static T& of(Json& json) {
+    if (!json.contents) json.contents = std::make_unique<Json::Contents>(Json::Contents{T()});
+    return std::get<T>(json.contents->of);
   }
 
   bool open(Json::Kind kind) {
     if (open_.size() == deepest)
       refuse(path_, line(), "nested more than " + std::to_string(deepest) + " deep; write it flatter");
-    open_.push_back(add(kind, 0).json);  // stays where it is: nothing is added beside it until it is closed
+    open_.push_back(&add(kind, 0));  // stays where it is: nothing is added beside it until it is closed
     return true;
   }
 
   const std::string& path_;
   const Cursor::Place& place_;
   std::vector<Json*> open_;
+  std::size_t values_ = 0;
   std::string key_;
 };
 
@@ -160,10 +182,20 @@ std::string shown(double number) {
 
 }  // namespace
 
-const std::string& Json::text() const { return contents ? contents->text : no_text; }
-const std::vector<Json>& Json::list() const { return contents ? contents->list : no_list; }
+const std::string& Json::text() const {
+  const auto* text = contents ? std::get_if<std::string>(&contents->of) : nullptr;
+  return text != nullptr ? *text : no_text;
+}
+
+const std::vector<Json>& Json::list() const {
+  const auto* list = contents ? std::get_if<std::vector<Json>>(&contents->of) : nullptr;
+  return list != nullptr ? *list : no_list;
+}
+
 const std::vector<std::pair<std::string, Json>>& Json::members() const {
-  return contents ? contents->members : no_members;
+  const auto* members =
+      contents ? std::get_if<std::vector<std::pair<std::string, Json>>>(&contents->of) : nullptr;
+  return members != nullptr ? *members : no_members;
 }
 
 const Json* Json::find(std::string_view key) const {
@@ -178,7 +210,15 @@ const char* kind_name(Json::Kind kind) {
 }
 
 Json parse_json(const std::string& path, std::string_view text) {
+  if (text.size() > most_json_bytes)
+    refuse(path, 0,
+           "JSON of " + std::to_string(text.size()) + " bytes; " + std::to_string(most_json_bytes) +
+               " are the most");
   if (text.substr(0, 3) == "\xef\xbb\xbf") text.remove_prefix(3);
+  if (const std::size_t nul = text.find('\0'); nul != text.npos) {  // the parser takes it for the end
+    const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(nul), '\n');
+    refuse(path, std::size_t(line), "is no JSON: a byte that is NUL; a text file is wanted");
+  }
   Cursor::Place place;
   Builder builder(path, place);
   nlohmann::json::sax_parse(Cursor(text.data(), &place), Cursor(text.data() + text.size(), nullptr),
@@ -187,7 +227,7 @@ Json parse_json(const std::string& path, std::string_view text) {
 }
 
 Members::Members(const std::string& path, const Json& object, const char* what,
-                 std::initializer_list<std::string_view> known)
+                 std::span<const std::string_view> known)
     : path_(path), object_(object), what_(what) {
   if (object.kind != Json::Kind::object)
     refuse(path, object.line,

@@ -4,10 +4,11 @@
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
-#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "common/math/vector.h"
@@ -22,7 +23,7 @@ struct Json {
   Kind kind = Kind::null;
   std::uint32_t line = 0;
   double number = 0;                   ///< of a boolean 0 or 1
-  std::unique_ptr<Contents> contents;  ///< of text, list and object
+  std::unique_ptr<Contents> contents;  ///< of text, list and object; none where those are empty
 
   const std::string& text() const;
   const std::vector<Json>& list() const;
@@ -33,14 +34,17 @@ struct Json {
 };
 
 struct Json::Contents {
-  std::string text;
-  std::vector<Json> list;
-  std::vector<std::pair<std::string, Json>> members;
+  std::variant<std::string, std::vector<Json>, std::vector<std::pair<std::string, Json>>> of;
 };
 
-/// The value that the text is. Throws InputError, with `path` and the line, for what is no JSON (RFC 8259),
-/// is nested more than 64 deep, has a key twice in an object, more than 2³² − 2 lines, or a number that no
-/// double holds.
+/// The most text that parse_json takes, and the most values in it.
+constexpr std::size_t most_json_bytes = std::size_t{64} << 20;
+constexpr std::size_t most_json_values = std::size_t{1} << 23;
+
+/// The value that the text is. Throws InputError, with `path` and the line, for what is no JSON (RFC 8259,
+/// UTF-8; a byte order mark is passed over), is nested more than 64 deep, has a key twice in an object, a
+/// number that no double holds, or is larger than the limits above. Takes at most 48 bytes of memory for a
+/// byte of text, and 1 GB altogether. Lines end with LF, CR LF or CR.
 Json parse_json(const std::string& path, std::string_view text);
 
 /// "a number", "text", "a list", …
@@ -52,10 +56,15 @@ class Members {
  public:
   /// `what` names the object for people ("a material"). An empty list of known keys takes all keys.
   Members(const std::string& path, const Json& object, const char* what,
-          std::initializer_list<std::string_view> known);
+          std::initializer_list<std::string_view> known)
+      : Members(path, object, what, std::span(known.begin(), known.size())) {}
+  Members(const std::string& path, const Json& object, const char* what,
+          std::span<const std::string_view> known);
 
   bool has(std::string_view key) const { return object_.find(key) != nullptr; }
   const Json* find(std::string_view key) const { return object_.find(key); }
+  /// The line that the object begins on.
+  std::size_t line() const { return object_.line; }
   /// Refuses where the key is missing.
   const Json& need(std::string_view key) const;
 

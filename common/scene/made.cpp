@@ -17,6 +17,12 @@ std::string shown(double number) {
   return text.str();
 }
 
+std::string listed(const std::vector<std::string>& words) {
+  std::string list;
+  for (const std::string& word : words) list += (list.empty() ? "" : ", ") + word;
+  return list;
+}
+
 }  // namespace
 
 Parameters::Parameters(const std::string& scene, const std::vector<Parameter>& declared,
@@ -31,17 +37,24 @@ Parameters::Parameters(const std::string& scene, const std::vector<Parameter>& d
     const auto found =
         std::find_if(values_.begin(), values_.end(), [&](const Parameter& p) { return name == p.name; });
     if (found == values_.end()) {
-      std::string names;
-      for (const Parameter& p : values_) names += (names.empty() ? "" : ", ") + std::string(p.name);
-      refuse(
-          scene, 0,
-          in_quotes(name) + " is no parameter of it; " + (names.empty() ? "it has none" : "it has " + names));
+      std::vector<std::string> names;
+      for (const Parameter& p : values_) names.push_back(p.name);
+      refuse(scene, 0,
+             in_quotes(name) + " is no parameter of it; it has " + (names.empty() ? "none" : listed(names)));
     }
     const std::string where = scene + ":" + found->name;
     if (!seen.insert(name).second) refuse(where, 0, "given twice; give it once");
     if (equals == word.npos)
       refuse(where, 0, "no value; write " + std::string(name) + "=" + shown(found->value));
-    const double value = parse_number(word.substr(equals + 1), where, 0);
+    const std::string_view said = word.substr(equals + 1);
+    const auto choice = std::find(found->words.begin(), found->words.end(), said);
+    if (choice != found->words.end()) {
+      found->value = found->low + static_cast<double>(choice - found->words.begin());
+      continue;
+    }
+    if (!found->words.empty() && said.find_first_not_of("0123456789") != said.npos)
+      refuse(where, 0, in_quotes(said) + " is none of its words; it takes " + listed(found->words));
+    const double value = parse_number(said, where, 0);
     if (!(value >= found->low && value <= found->high))
       refuse(
           where, 0,

@@ -14,13 +14,16 @@ struct Parameter {
   const char* help;
   double value, low, high;  ///< what it is unless said, and the range that it is taken from
   bool whole = true;        ///< only whole numbers
+  /// Where it is a choice: the words for low, low + 1, …, high; the numbers stay good as well.
+  std::vector<std::string> words = {};
 };
 
 /// Values for the parameters of a made scene.
 class Parameters {
  public:
   /// Reads "name=value,name=value"; what is not named keeps its value. Throws InputError for a name that is
-  /// not there (naming those that are), a name given twice, what is no number or out of range.
+  /// not there (naming those that are), a name given twice, what is no number and no word for one, or out of
+  /// range.
   Parameters(const std::string& scene, const std::vector<Parameter>& declared, std::string_view text);
 
   double operator[](std::string_view name) const;

@@ -1,22 +1,20 @@
 #include "common/scene/obj.h"
 
-#include <tiny_obj_loader.h>
-
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <istream>
 #include <map>
 #include <new>
+#include <optional>
+#include <random>
 #include <set>
-#include <sstream>
-#include <streambuf>
-#include <unordered_map>
+#include <utility>
 
 #include "common/error.h"
 #include "common/math/random.h"
+#include "common/scene/mtl.h"
 #include "common/scene/polygon.h"
 #include "common/scene/text.h"
 
@@ -27,33 +25,6 @@ constexpr std::size_t most_vertices = 2147483647;
 constexpr std::size_t most_triangles = 4294967294;
 constexpr std::size_t most_corners = 10000;  // splitting takes time with their square
 
-std::string counted(std::size_t n, const char* what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-}
-
-/// Checks that the rest of the statement is numbers, and counts them. tinyobjloader makes a NaN of "0e500",
-/// for which it multiplies by 5⁵⁰⁰: such a zero is written anew.
-std::size_t checked_numbers(Statements& statements, const std::string& path) {
-  statements.drop_comment();
-  std::size_t count = 0;
-  for (std::string_view word = statements.word(); !word.empty(); word = statements.word(), ++count) {
-    const double value = parse_number(word, path, statements.line());
-    if (value == 0 && word.find_first_of("eE") != word.npos) {
-      statements.replace_word(word[0] == '-' ? "-0" : "0");
-    }
-  }
-  return count;
-}
-
-/// A stream over text that it neither copies nor changes.
-class TextBuffer : public std::streambuf {
- public:
-  explicit TextBuffer(std::string& text) { setg(text.data(), text.data(), text.data() + text.size()); }
-};
-
-// The scan. tinyobjloader reads "nan" as 0 and index 99 as the last vertex; so nothing reaches it that was
-// not checked.
-
 enum Kind { position, texture_coordinate, normal };  // in the order that a face's corner names them
 
 struct KindName {
@@ -62,190 +33,78 @@ struct KindName {
 };
 constexpr KindName kinds[3] = {{"v", "vertex"}, {"vt", "texture coordinate"}, {"vn", "normal"}};
 
-class Scan {
- public:
-  struct Library {
-    std::string name;
-    std::size_t line;
-  };
-  std::array<std::size_t, 3> defined{};  ///< statements of each kind
-  std::size_t faces = 0;
-  std::size_t corners = 0;  ///< of all faces
-  std::vector<Library> libraries;
-  std::vector<std::string> warnings;
+/// What makes a vertex: the same position with another normal is another vertex. −1 where the file names
+/// none.
+struct Corner {
+  std::array<std::int32_t, 3> index{-1, -1, -1};
 
-  /// Throws InputError at the first mistake in the text, which it normalises so that tinyobjloader reads it
-  /// rightly.
-  Scan(const std::string& path, std::string& text) : path_(path), statements_(text) {
-    while (statements_.next()) statement();
-    if (!any_known_)
-      refuse(path_, 0, "no OBJ statement in it; an OBJ file has lines like \"v 0 0 0\" and \"f 1 2 3\"");
-    check_forward_references();
-    warn();
+  bool operator==(const Corner& other) const {  // three comparisons instead of a call of memcmp
+    return index[0] == other.index[0] && index[1] == other.index[1] && index[2] == other.index[2];
   }
+};
+
+/// A mesh as it grows, whose vertices are still corners of the file.
+class GrowingMesh {
+ public:
+  std::string name;
+  std::vector<Corner> vertices;  ///< in the order of their first use
+  std::vector<uvec3> triangles;
+  std::vector<std::uint32_t> materials;  ///< empty while all are 0
+
+  /// The number of the corner's vertex. `salt` keeps files from choosing corners that collide.
+  std::uint32_t number(const Corner& corner, std::uint64_t salt) {
+    if (4 * (vertices.size() + 1) > 3 * table_.size()) grow(salt);
+    for (std::size_t i = hash(corner, salt) & (table_.size() - 1);; i = (i + 1) & (table_.size() - 1)) {
+      if (table_[i] == 0) {
+        vertices.push_back(corner);
+        return (table_[i] = static_cast<std::uint32_t>(vertices.size())) - 1;
+      }
+      if (vertices[table_[i] - 1] == corner) return table_[i] - 1;
+    }
+  }
+
+  void add(const uvec3& triangle, std::uint32_t material) {
+    if (material != 0 && materials.empty()) materials.assign(triangles.size(), 0);
+    if (material != 0 || !materials.empty()) materials.push_back(material);
+    triangles.push_back(triangle);
+  }
+
+  void drop_table() { std::vector<std::uint32_t>().swap(table_); }
 
  private:
-  struct ForwardReference {
-    int index;
-    std::size_t line;
-  };
-
-  [[noreturn]] void refuse_here(const std::string& what) { refuse(path_, statements_.line(), what); }
-
-  void statement() {
-    const std::string_view keyword = statements_.word();
-    bool known = true;
-    if (keyword == "v") {
-      numbers(position);
-    } else if (keyword == "vt") {
-      numbers(texture_coordinate);
-    } else if (keyword == "vn") {
-      numbers(normal);
-    } else if (keyword == "f") {
-      face();
-    } else if (keyword == "l") {
-      ++lines_;
-    } else if (keyword == "p") {
-      ++points_;
-    } else if (keyword == "mtllib") {
-      libraries.push_back({std::string(statements_.rest()), statements_.line()});
-    } else if (keyword != "o" && keyword != "g" && keyword != "s" && keyword != "usemtl") {
-      known = false;
-      if (others_++ == 0)
-        first_other_ = in_quotes(keyword) + " in line " + std::to_string(statements_.line());
-    }
-    any_known_ |= known;
-  }
-
-  void numbers(Kind kind) {
-    const std::size_t count = checked_numbers(statements_, path_);
-    // v x y z, with a weight, a colour or both; vt u [v [w]]; vn x y z
-    const bool right = kind == position             ? count == 3 || count == 4 || count == 6 || count == 7
-                       : kind == texture_coordinate ? count >= 1 && count <= 3
-                                                    : count == 3;
-    if (!right) {
-      refuse_here(std::string(kinds[kind].statement) + " with " + counted(count, "number") + "; a " +
-                  kinds[kind].name + (kind == texture_coordinate ? " has 2" : " has 3"));
-    }
-    if (++defined[kind] > most_vertices) refuse_here("more than 2147483647 vertices; split the file");
-  }
-
-  void face() {
-    statements_.drop_comment();
-    std::size_t count = 0;
-    for (std::string_view word = statements_.word(); !word.empty(); word = statements_.word(), ++count)
-      corner(word);
-    if (count < 3) refuse_here("f with " + counted(count, "corner") + "; a face has at least 3");
-    if (count > most_corners)
-      refuse_here("f with " + counted(count, "corner") + "; split it, 10000 are the most");
-    ++faces;
-    corners += count;
-    triangles_ += count - 2;
-    if (triangles_ > most_triangles) refuse_here("more than 4294967294 triangles; split the file");
-  }
-
-  void corner(std::string_view word) {
-    const char* at = word.data();
-    const char* const end = at + word.size();
-    const auto malformed = [&] {
-      refuse_here("corner " + in_quotes(word) + " is malformed; write v, v/vt, v//vn or v/vt/vn");
+  static std::uint64_t hash(const Corner& corner, std::uint64_t salt) {
+    const auto pair = [](std::int32_t a, std::int32_t b) {
+      return static_cast<std::uint64_t>(static_cast<std::uint32_t>(a)) << 32 | static_cast<std::uint32_t>(b);
     };
-    for (const Kind kind : {position, texture_coordinate, normal}) {
-      if (kind != position) {
-        if (at == end) return;
-        if (*at++ != '/') malformed();
-        if (kind == texture_coordinate && at != end && *at == '/') continue;  // v//vn
-      }
-      int index = 0;
-      const auto [stop, error] = std::from_chars(at, end, index);
-      if (error == std::errc::invalid_argument) malformed();
-      if (error == std::errc::result_out_of_range) {
-        refuse_here("index in " + in_quotes(word) + " does not fit 32 bits; the file defines " +
-                    std::to_string(defined[kind]) + " so far");
-      }
-      check_index(kind, index);
-      at = stop;
-    }
-    if (at != end) malformed();
+    const std::uint64_t first = Random::mixed(pair(corner.index[position], corner.index[normal]) ^ salt);
+    return Random::mixed(first ^ static_cast<std::uint32_t>(corner.index[texture_coordinate]));
   }
 
-  void check_index(Kind kind, int index) {
-    const auto so_far = static_cast<std::int64_t>(defined[kind]);
-    if (index == 0) refuse_here(std::string("index 0 of a ") + kinds[kind].name + "; OBJ counts from 1");
-    if (index < -so_far) {
-      refuse_here(std::string(kinds[kind].name) + " " + std::to_string(index) + " lies before the first; " +
-                  std::to_string(so_far) + " are defined so far");
-    }
-    // The file may define it later. Only the largest so far can be the first that turns out to be missing.
-    std::vector<ForwardReference>& forward = forward_[kind];
-    if (index > so_far && (forward.empty() || index > forward.back().index)) {
-      forward.push_back({index, statements_.line()});
+  void grow(std::uint64_t salt) {
+    const std::size_t size = std::max<std::size_t>(16, 2 * table_.size());
+    drop_table();  // it can be made anew
+    table_.resize(size, 0);
+    for (std::size_t v = 0; v < vertices.size(); ++v) {
+      std::size_t i = hash(vertices[v], salt) & (size - 1);
+      while (table_[i] != 0) i = (i + 1) & (size - 1);
+      table_[i] = static_cast<std::uint32_t>(v + 1);
     }
   }
 
-  void check_forward_references() {
-    const ForwardReference* first = nullptr;
-    Kind kind_of_first = position;
-    for (const Kind kind : {position, texture_coordinate, normal}) {
-      for (const ForwardReference& reference : forward_[kind]) {
-        if (reference.index <= static_cast<std::int64_t>(defined[kind])) continue;
-        if (first == nullptr || reference.line < first->line) {
-          first = &reference;
-          kind_of_first = kind;
-        }
-        break;
-      }
-    }
-    if (first == nullptr) return;
-    refuse(path_, first->line,
-           std::string(kinds[kind_of_first].name) + " " + std::to_string(first->index) +
-               " does not exist; the file defines " + std::to_string(defined[kind_of_first]));
-  }
-
-  void warn() {
-    if (faces == 0) warnings.push_back(path_ + ": no faces in it: the scene is empty");
-    if (lines_ > 0) warnings.push_back(path_ + ": " + counted(lines_, "line") + " (l) ignored");
-    if (points_ > 0) warnings.push_back(path_ + ": " + counted(points_, "point") + " (p) ignored");
-    if (others_ > 0) {
-      warnings.push_back(path_ + ": " + counted(others_, "unknown statement") + " ignored, the first " +
-                         first_other_);
-    }
-  }
-
-  const std::string& path_;
-  Statements statements_;
-  bool any_known_ = false;
-  std::size_t triangles_ = 0, lines_ = 0, points_ = 0, others_ = 0;
-  std::string first_other_;
-  std::array<std::vector<ForwardReference>, 3> forward_;
+  // By open addressing, numbers of vertices + 1; 0 is free. Four bytes for each, and a third more at least.
+  std::vector<std::uint32_t> table_;
 };
-
-// The parse: what tinyobjloader hands over, as flat arrays.
-
-struct Corner {
-  int position, texture_coordinate, normal;  ///< −1 where the file names none
-
-  bool operator==(const Corner&) const = default;
-};
-
-struct Face {
-  std::uint32_t corners, mesh, material;
-};
-
-std::string trimmed(std::string_view name) {
-  const std::size_t begin = name.find_first_not_of(" \t");
-  if (begin == name.npos) return {};
-  return std::string(name.substr(begin, name.find_last_not_of(" \t") + 1 - begin));
-}
 
 /// Numbers for names, in the order of their first use. Asking again for the same name is cheap.
 class Names {
  public:
   std::vector<std::string> list;
 
-  void set(std::string name) {
+  const std::string& name() const { return name_; }
+
+  void set(std::string_view name) {
     if (name == name_) return;
-    name_ = std::move(name);
+    name_ = name;
     known_ = false;
   }
 
@@ -266,257 +125,500 @@ class Names {
   std::map<std::string, std::uint32_t> numbers_;
 };
 
-class Parse {
+/// A statement of the extension: what its indices mean is known at the end of the file.
+struct Element {
+  enum class What : std::uint8_t { camera, point_light, plane, sphere } what;
+  std::size_t line;
+  std::uint32_t material;      // of a plane or sphere
+  std::string light_material;  // of a light
+  std::array<std::int32_t, 4> index;
+};
+
+/// Reads the OBJ file alone.
+class Reader {
  public:
+  struct Library {
+    std::string name;
+    std::size_t line;
+  };
+
   std::vector<vec3> positions, normals;
   std::vector<vec2> texture_coordinates;
-  std::vector<Face> faces;
-  std::vector<Corner> corners;  ///< of all faces, one after the other
-  Names meshes, materials;      ///< those that have faces
+  std::vector<GrowingMesh> meshes;
+  Names materials;  ///< those that are used
+  std::vector<Library> libraries;
+  std::vector<Element> elements;
 
-  Parse(std::string& text, const Scan& scan) {
-    positions.reserve(scan.defined[position]);
-    texture_coordinates.reserve(scan.defined[texture_coordinate]);
-    normals.reserve(scan.defined[normal]);
-    faces.reserve(scan.faces);
-    corners.reserve(scan.corners);
-    tinyobj::callback_t callback;
-    callback.vertex_cb = [](void* p, float x, float y, float z, float) {
-      self(p).positions.push_back({x, y, z});
-    };
-    callback.normal_cb = [](void* p, float x, float y, float z) { self(p).normals.push_back({x, y, z}); };
-    callback.texcoord_cb = [](void* p, float u, float v, float) {
-      self(p).texture_coordinates.push_back({u, v});
-    };
-    callback.index_cb = [](void* p, tinyobj::index_t* indices, int n) { self(p).add_face(indices, n); };
-    callback.usemtl_cb = [](void* p, const char* name, int) { self(p).materials.set(trimmed(name)); };
-    callback.object_cb = [](void* p, const char* name) { self(p).enter(trimmed(name), ""); };
-    callback.group_cb = [](void* p, const char** names, int n) {
-      std::string group;
-      for (int i = 0; i < n; ++i) {
-        if (i > 0) group += ' ';
-        group += names[i];
-      }
-      self(p).enter(self(p).object_, group);
-    };
-    TextBuffer buffer(text);
-    std::istream stream(&buffer);
-    tinyobj::LoadObjWithCallback(stream, callback, this);
+  /// Throws InputError at the first mistake in the file.
+  Reader(const std::string& path, std::vector<std::string>& warnings)
+      : path_(path), file_(path), statements_(file_) {
+    std::random_device random;
+    salt_ = static_cast<std::uint64_t>(random()) << 32 | random();
+    while (statements_.next()) statement();
+    if (statements_.line() == 0)
+      refuse(path_, 0, "is empty; an OBJ file has lines like \"v 0 0 0\" and \"f 1 2 3\"");
+    if (!any_known_)
+      refuse(path_, 0, "no OBJ statement in it; an OBJ file has lines like \"v 0 0 0\" and \"f 1 2 3\"");
+    check_forward_references();
+    for (GrowingMesh& mesh : meshes) mesh.drop_table();
+    split_deferred();
+    warn(warnings);
   }
 
  private:
-  static Parse& self(void* pointer) { return *static_cast<Parse*>(pointer); }
+  struct ForwardReference {
+    std::int32_t index;
+    std::size_t line;
+  };
+
+  /// A polygon whose positions were not known when it came.
+  struct Deferred {
+    std::uint32_t mesh;
+    std::size_t first;  // of its triangles
+    std::vector<std::uint32_t> polygon;
+  };
+
+  [[noreturn]] void refuse_here(const std::string& what) { refuse(path_, statements_.line(), what); }
+
+  std::size_t defined(Kind kind) const {
+    return kind == position             ? positions.size()
+           : kind == texture_coordinate ? texture_coordinates.size()
+                                        : normals.size();
+  }
+
+  void statement() {
+    const std::string_view keyword = statements_.word();
+    bool known = true;
+    if (keyword == "v") {
+      const std::array<float, 3> p = numbers(position);
+      positions.push_back({p[0], p[1], p[2]});
+    } else if (keyword == "vt") {
+      const std::array<float, 3> t = numbers(texture_coordinate);
+      texture_coordinates.push_back({t[0], t[1]});
+    } else if (keyword == "vn") {
+      const std::array<float, 3> n = numbers(normal);
+      normals.push_back({n[0], n[1], n[2]});
+    } else if (keyword == "f" || keyword == "fo") {  // fo is what the format's first version wrote
+      face();
+    } else if (keyword == "usemtl") {
+      materials.set(statements_.rest());
+    } else if (keyword == "g") {
+      std::string group;
+      for (std::string_view word = statements_.word(); !word.empty(); word = statements_.word()) {
+        if (!group.empty()) group += ' ';
+        group += word;
+      }
+      enter(object_, group);
+    } else if (keyword == "o") {
+      enter(std::string(statements_.rest()), "");
+    } else if (keyword == "l") {
+      corners_of("l", "line", 2, 2);
+      ++lines_;
+    } else if (keyword == "p") {
+      corners_of("p", "point", 1, 1);
+      ++points_;
+    } else if (keyword == "mtllib") {
+      libraries.push_back({std::string(statements_.rest()), statements_.line()});
+      if (libraries.back().name.empty())
+        refuse_here("mtllib without a name; write it like \"mtllib house.mtl\"");
+    } else if (keyword != "s" && !element(keyword)) {
+      if (keyword == "curv" || keyword == "curv2" || keyword == "surf") in_body_ = true;
+      if (keyword == "end") in_body_ = false;
+      known = false;
+      if (others_++ == 0)
+        first_other_ = in_quotes(keyword) + " in line " + std::to_string(statements_.line());
+    }
+    any_known_ |= known;
+  }
+
+  /// The numbers of the statement, the first three; 0 where there are fewer.
+  std::array<float, 3> numbers(Kind kind) {
+    statements_.drop_comment();
+    std::array<float, 3> values{};
+    std::size_t count = 0;
+    for (std::string_view word = statements_.word(); !word.empty(); word = statements_.word(), ++count) {
+      const float value = parse_float(word, path_, statements_.line());
+      if (count < 3) values[count] = value;
+    }
+    // v x y z, with a weight, a colour or both; vt u [v [w]]; vn x y z
+    const bool right = kind == position             ? count == 3 || count == 4 || count == 6 || count == 7
+                       : kind == texture_coordinate ? count >= 1 && count <= 3
+                                                    : count == 3;
+    if (!right) {
+      refuse_here(std::string(kinds[kind].statement) + " with " + counted(count, "number") + "; a " +
+                  kinds[kind].name + (kind == texture_coordinate ? " has 2" : " has 3"));
+    }
+    if (defined(kind) == most_vertices) refuse_here("more than 2147483647 vertices; split the file");
+    return values;
+  }
+
+  // Faces.
+
+  void face() {
+    statements_.drop_comment();
+    corners_.clear();
+    std::size_t count = 0;
+    for (std::string_view word = statements_.word(); !word.empty(); word = statements_.word(), ++count) {
+      const Corner found = corner(word, 3);
+      if (count < most_corners) corners_.push_back(found);
+    }
+    if (count == 0) refuse_here("f with 0 corners; a face has at least 3");
+    if (count < 3) {  // modellers write the edges that they are left with
+      ++edges_;
+      return;
+    }
+    if (count > most_corners)
+      refuse_here("f with " + counted(count, "corner") + "; split it, 10000 are the most");
+    triangle_count_ += count - 2;
+    if (triangle_count_ > most_triangles) refuse_here("more than 4294967294 triangles; split the file");
+    if (names_.number() == meshes.size()) {
+      const std::string& name = names_.list.back();
+      meshes.emplace_back().name = name;
+    }
+    add_face();
+  }
+
+  void add_face() {
+    const std::uint32_t mesh_number = names_.number(), material = materials.number();
+    GrowingMesh& mesh = meshes[mesh_number];
+    polygon_.clear();
+    bool all_defined = true;
+    for (const Corner& corner : corners_) {
+      const std::size_t before = mesh.vertices.size();
+      polygon_.push_back(mesh.number(corner, salt_));
+      vertex_count_ += mesh.vertices.size() - before;
+      all_defined &= static_cast<std::size_t>(corner.index[position]) < positions.size();
+    }
+    if (vertex_count_ > most_vertices) refuse(path_, 0, "more than 2147483647 vertices; split the file");
+    if (polygon_.size() > 3 && all_defined) {
+      split(mesh);
+    } else {
+      if (polygon_.size() > 3) deferred_.push_back({mesh_number, mesh.triangles.size(), polygon_});
+      split_.assign(polygon_.size() - 2, {0, 1, 2});
+    }
+    for (const uvec3& t : split_) mesh.add({polygon_[t.x], polygon_[t.y], polygon_[t.z]}, material);
+  }
+
+  void split(const GrowingMesh& mesh) {
+    points_of_polygon_.clear();
+    for (const std::uint32_t vertex : polygon_)
+      points_of_polygon_.push_back(
+          positions[static_cast<std::size_t>(mesh.vertices[vertex].index[position])]);
+    if (!split_polygon(points_of_polygon_, split_)) ++crossed_;
+  }
+
+  void split_deferred() {
+    for (Deferred& face : deferred_) {
+      GrowingMesh& mesh = meshes[face.mesh];
+      polygon_ = std::move(face.polygon);
+      split(mesh);
+      for (std::size_t i = 0; i < split_.size(); ++i)
+        mesh.triangles[face.first + i] = {polygon_[split_[i].x], polygon_[split_[i].y],
+                                          polygon_[split_[i].z]};
+    }
+    std::vector<Deferred>().swap(deferred_);
+  }
+
+  /// Checks the corners of a statement that is left out. They have so many parts at most.
+  void corners_of(const char* statement, const char* name, std::size_t least, int parts) {
+    statements_.drop_comment();
+    std::size_t count = 0;
+    for (std::string_view word = statements_.word(); !word.empty(); word = statements_.word(), ++count)
+      corner(word, parts);
+    if (count < least)
+      refuse_here(std::string(statement) + " with " + counted(count, "corner") + "; a " + name +
+                  " has at least " + std::to_string(least));
+  }
+
+  Corner corner(std::string_view word, int parts) {
+    Corner result;
+    const char* at = word.data();
+    const char* const end = at + word.size();
+    const auto malformed = [&] {
+      refuse_here("corner " + in_quotes(word) + " is malformed; write " +
+                  (parts == 3   ? "v, v/vt, v//vn or v/vt/vn"
+                   : parts == 2 ? "v or v/vt"
+                                : "v"));
+    };
+    for (int part = 0; part < parts; ++part) {
+      const Kind kind = static_cast<Kind>(part);
+      if (kind != position) {
+        if (at == end) return result;
+        if (*at++ != '/') malformed();
+        if (kind == texture_coordinate && parts == 3 && at != end && *at == '/') continue;  // v//vn
+      }
+      std::int32_t index = 0;
+      const auto [stop, error] = std::from_chars(at, end, index);
+      if (error == std::errc::invalid_argument) malformed();
+      if (error == std::errc::result_out_of_range) {
+        refuse_here("index in " + in_quotes(word) + " does not fit 32 bits; the file defines " +
+                    std::to_string(defined(kind)) + " so far");
+      }
+      result.index[kind] = resolved(kind, index);
+      at = stop;
+    }
+    if (at != end) malformed();
+    return result;
+  }
+
+  /// The index counted from 0. The file may define later what it means.
+  std::int32_t resolved(Kind kind, std::int32_t index) {
+    const auto so_far = static_cast<std::int64_t>(defined(kind));
+    if (index == 0) refuse_here(std::string("index 0 of a ") + kinds[kind].name + "; OBJ counts from 1");
+    if (index < -so_far) {
+      refuse_here(std::string(kinds[kind].name) + " " + std::to_string(index) + " lies before the first; " +
+                  std::to_string(so_far) + " are defined so far");
+    }
+    if (index < 0) return static_cast<std::int32_t>(so_far + index);
+    // Only the largest so far can be the first that turns out to be missing.
+    std::vector<ForwardReference>& forward = forward_[kind];
+    if (index > so_far && (forward.empty() || index > forward.back().index))
+      forward.push_back({index, statements_.line()});
+    return index - 1;
+  }
+
+  void check_forward_references() {
+    const ForwardReference* first = nullptr;
+    Kind kind_of_first = position;
+    for (const Kind kind : {position, texture_coordinate, normal}) {
+      for (const ForwardReference& reference : forward_[kind]) {
+        if (reference.index <= static_cast<std::int64_t>(defined(kind))) continue;
+        if (first == nullptr || reference.line < first->line) {
+          first = &reference;
+          kind_of_first = kind;
+        }
+        break;
+      }
+    }
+    if (first == nullptr) return;
+    refuse(path_, first->line,
+           std::string(kinds[kind_of_first].name) + " " + std::to_string(first->index) +
+               " does not exist; the file defines " + std::to_string(defined(kind_of_first)));
+  }
 
   // Groups of one name in two objects are two meshes; a group that comes back later is the same mesh.
   void enter(const std::string& object, const std::string& group) {
     object_ = object;
-    meshes.set(object.empty() ? group : group.empty() || group == object ? object : object + "/" + group);
+    names_.set(object.empty() ? group : group.empty() || group == object ? object : object + "/" + group);
   }
 
-  // tinyobjloader gives a callback OBJ's own indices: from 1, negative from the last so far, 0 for none.
-  static int resolved(int index, std::size_t defined) {
-    return index < 0 ? static_cast<int>(static_cast<std::int64_t>(defined) + index) : index - 1;
+  // The extension.
+
+  /// Is it a statement of the extension?
+  bool element(std::string_view keyword) {
+    using What = Element::What;
+    if (keyword == "c") {
+      read_element(What::camera, keyword, {position, position, normal}, 3);
+    } else if (keyword == "lp") {
+      read_element(What::point_light, keyword, {position}, 1);
+    } else if (keyword == "pl") {
+      read_element(What::plane, keyword, {position, normal, normal}, 2);
+    } else if (keyword == "sp" && !in_body_) {
+      read_element(What::sphere, keyword, {position, normal, normal}, 2);
+    } else if (keyword == "ld") {
+      read_indices(keyword, {position, normal}, 2);
+      ++area_lights_;
+    } else if (keyword == "lq") {
+      read_indices(keyword, {position, position, position, position}, 4);
+      ++area_lights_;
+    } else {
+      return false;
+    }
+    return true;
   }
 
-  void add_face(const tinyobj::index_t* indices, int n) {
-    faces.push_back({static_cast<std::uint32_t>(n), meshes.number(), materials.number()});
-    for (int i = 0; i < n; ++i) {
-      corners.push_back({resolved(indices[i].vertex_index, positions.size()),
-                         resolved(indices[i].texcoord_index, texture_coordinates.size()),
-                         resolved(indices[i].normal_index, normals.size())});
+  std::array<std::int32_t, 4> read_indices(std::string_view keyword, std::initializer_list<Kind> wanted,
+                                           std::size_t least) {
+    statements_.drop_comment();
+    std::array<std::int32_t, 4> result{-1, -1, -1, -1};
+    std::size_t count = 0;
+    for (std::string_view word = statements_.word(); !word.empty(); word = statements_.word(), ++count) {
+      if (count >= wanted.size()) continue;
+      const Kind kind = wanted.begin()[count];
+      std::int32_t index = 0;
+      const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), index);
+      if (error != std::errc{} || stop != word.data() + word.size())
+        refuse_here(in_quotes(word) + " is no index of a " + kinds[kind].name + "; a whole number is wanted");
+      result[count] = resolved(kind, index);
+    }
+    if (count < least || count > wanted.size()) {
+      std::string right = std::string(keyword);
+      for (const Kind kind : wanted) right += std::string(" ") + kinds[kind].statement;
+      refuse_here(std::string(keyword) + " with " + std::to_string(count) +
+                  (count == 1 ? " index; write " : " indices; write ") + right);
+    }
+    return result;
+  }
+
+  void read_element(Element::What what, std::string_view keyword, std::initializer_list<Kind> wanted,
+                    std::size_t least) {
+    Element element{what, statements_.line(), 0, {}, read_indices(keyword, wanted, least)};
+    if (what == Element::What::point_light) element.light_material = materials.name();
+    if (what == Element::What::plane || what == Element::What::sphere) element.material = materials.number();
+    elements.push_back(std::move(element));
+  }
+
+  void warn(std::vector<std::string>& warnings) const {
+    if (meshes.empty() && elements.empty())
+      warnings.push_back(path_ + ": no faces in it: the scene is empty");
+    if (edges_ > 0)
+      warnings.push_back(path_ + ": " + counted(edges_, "face") + " with fewer than 3 corners left out");
+    if (lines_ > 0) warnings.push_back(path_ + ": " + counted(lines_, "line") + " (l) ignored");
+    if (points_ > 0) warnings.push_back(path_ + ": " + counted(points_, "point") + " (p) ignored");
+    if (area_lights_ > 0)
+      warnings.push_back(path_ + ": " + counted(area_lights_, "disc or quad light") + " (ld, lq) ignored");
+    if (others_ > 0) {
+      warnings.push_back(path_ + ": " + counted(others_, "unknown statement") + " ignored, the first " +
+                         first_other_);
+    }
+    if (crossed_ > 0) {
+      warnings.push_back(path_ + ": " + counted(crossed_, "polygon") +
+                         " twisted, crossing itself or without area, split as well as could be");
     }
   }
 
+  const std::string& path_;
+  TextFile file_;
+  Statements statements_;
+  std::uint64_t salt_ = 0;
+  bool any_known_ = false, in_body_ = false;
   std::string object_;
+  Names names_;  // of meshes
+  std::size_t triangle_count_ = 0, vertex_count_ = 0;
+  std::size_t lines_ = 0, edges_ = 0, points_ = 0, area_lights_ = 0, others_ = 0, crossed_ = 0;
+  std::string first_other_;
+  std::array<std::vector<ForwardReference>, 3> forward_;
+  std::vector<Deferred> deferred_;
+  // of the face that is being read
+  std::vector<Corner> corners_;
+  std::vector<std::uint32_t> polygon_;
+  std::vector<vec3> points_of_polygon_;
+  std::vector<uvec3> split_;
 };
 
 // Materials.
 
-/// Throws InputError where a number in the MTL text, which tinyobjloader would read as 0, is malformed or
-/// missing.
-void check_materials(const std::string& path, std::string& text) {
-  static const std::map<std::string_view, std::size_t> numbers_of = {
-      {"Ka", 3}, {"Kd", 3}, {"Ks", 3},  {"Ke", 3},    {"Kt", 3},     {"Tf", 3},
-      {"Ni", 1}, {"Ns", 1}, {"d", 1},   {"Tr", 1},    {"Pr", 1},     {"Pm", 1},
-      {"Ps", 1}, {"Pc", 1}, {"Pcr", 1}, {"aniso", 1}, {"anisor", 1}, {"illum", 1}};
-  Statements statements(text);
-  bool any = false;
-  while (statements.next()) {
-    const std::string_view keyword = statements.word();
-    any |= keyword == "newmtl";
-    const auto found = numbers_of.find(keyword);
-    if (found == numbers_of.end()) continue;
-    const std::size_t count = checked_numbers(statements, path);
-    if (count != found->second) {
-      refuse(path, statements.line(),
-             std::string(keyword) + " with " + counted(count, "number") + "; it takes " +
-                 std::to_string(found->second));
-    }
+/// Names in quotes, a few of them.
+class Listed {
+ public:
+  void add(std::string_view name) {
+    if (++count_ <= 8) text_ += (text_.empty() ? "" : ", ") + in_quotes(name);
   }
-  if (!any) refuse(path, 0, "no material in it; a library has lines like \"newmtl red\" and \"Kd 1 0 0\"");
-}
-
-using Materials = std::map<std::string, Material>;
-
-/// Adds the materials of the library; false where there is no such file.
-bool read_library(const std::filesystem::path& file, Materials& materials) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) return false;
-  std::string text = read_text(file.string());
-  check_materials(file.string(), text);
-  TextBuffer buffer(text);
-  std::istream stream(&buffer);
-  std::map<std::string, int> numbers;
-  std::vector<tinyobj::material_t> read;
-  tinyobj::LoadMtl(&numbers, &read, &stream, nullptr, nullptr);
-  for (const tinyobj::material_t& material : read) {
-    const std::string name = trimmed(material.name);
-    const vec3 diffuse(material.diffuse[0], material.diffuse[1], material.diffuse[2]);
-    Material& made = materials.try_emplace(name).first->second;
-    if (!made.name.empty()) continue;  // the first of a name holds
-    made.name = name;
-    made.diffuse = diffuse;
+  bool empty() const { return count_ == 0; }
+  std::string text() const {
+    return count_ <= 8 ? text_ : text_ + " and " + std::to_string(count_ - 8) + " more";
   }
-  return true;
-}
 
-/// Reads the libraries that lie beside the OBJ file. A library's name may hold spaces; else the spaces
-/// separate names.
-Materials read_libraries(const std::string& path, const std::vector<Scan::Library>& libraries,
-                         std::vector<std::string>& warnings) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  Materials materials;
-  std::set<std::string> seen;
+ private:
+  std::size_t count_ = 0;
+  std::string text_;
+};
+
+/// Reads the libraries that the file names. A library's name may hold spaces; else the spaces separate names.
+MaterialLibraries read_libraries(const std::string& path, const std::vector<Reader::Library>& libraries,
+                                 const LoadOptions& options, std::vector<std::string>& warnings) {
+  MaterialLibraries result;
+  std::set<std::filesystem::path> seen;
+  const auto read = [&](const std::string& name, std::size_t line) {
+    const std::filesystem::path file = named_file(name, path, line, options);
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(file, error)) return false;
+    if (seen.insert(std::filesystem::weakly_canonical(file, error)).second)
+      result.read(file.string(), warnings);
+    return true;
+  };
+  Listed missing;
+  std::size_t line_of_first = 0;
   for (const auto& [names, line] : libraries) {
-    if (!seen.insert(names).second || read_library(folder / names, materials)) continue;
-    std::istringstream words(names);
-    for (std::string name; words >> name;) {
-      if (name != names && (!seen.insert(name).second || read_library(folder / name, materials))) continue;
-      warnings.push_back(path + ":" + std::to_string(line) + ": no material library " + in_quotes(name));
+    if (read(names, line)) continue;
+    for (std::size_t at = 0; at < names.size();) {
+      const std::size_t end = std::min(names.find_first_of(" \t", at), names.size());
+      const std::string name = names.substr(at, end - at);
+      at = std::min(names.find_first_not_of(" \t", end), names.size());
+      if (name != names && read(name, line)) continue;
+      if (missing.empty()) line_of_first = line;
+      missing.add(name);
     }
   }
-  return materials;
+  if (!missing.empty())
+    warnings.push_back(path + ":" + std::to_string(line_of_first) + ": no material library " +
+                       missing.text());
+  return result;
 }
 
-void add_materials(const std::string& path, const std::vector<std::string>& names, const Materials& defined,
-                   Scene& scene) {
-  std::string missing;
+void add_materials(const std::string& path, const std::vector<std::string>& names,
+                   const MaterialLibraries& libraries, const LoadOptions& options, Scene& scene) {
+  TextureSet textures(scene, options);
+  Listed missing;
   for (const std::string& name : names) {
-    const auto found = defined.find(name);
-    if (found != defined.end() && !name.empty()) {
-      scene.materials.push_back(found->second);
-      continue;
+    std::optional<Material> found = libraries.material(name, textures, options, scene);
+    if (!found) {
+      found.emplace().name = name.empty() ? "default" : name;
+      if (!name.empty()) missing.add(name);
     }
-    scene.materials.emplace_back().name = name.empty() ? "default" : name;
-    if (!name.empty()) missing += (missing.empty() ? "" : ", ") + in_quotes(name);
+    scene.materials.push_back(std::move(*found));
   }
   if (!missing.empty()) {
-    scene.warnings.push_back(path + ": no library defines the material " + missing + ": grey instead");
+    scene.warnings.push_back(path + ": no library defines the material " + missing.text() + ": grey instead");
   }
 }
 
 // The meshes.
 
-/// What makes a vertex: the same position with another normal is another vertex.
-struct VertexKey {
-  Corner corner;
-  std::uint32_t mesh;
-
-  bool operator==(const VertexKey&) const = default;
-};
-
-struct VertexHash {
-  std::size_t operator()(const VertexKey& key) const {
-    const auto pair = [](auto a, auto b) {
-      return static_cast<std::uint64_t>(static_cast<std::uint32_t>(a)) << 32 | static_cast<std::uint32_t>(b);
-    };
-    return Random::mixed(pair(key.corner.position, key.mesh) ^
-                         Random::mixed(pair(key.corner.texture_coordinate, key.corner.normal)));
-  }
-};
-
 class Build {
  public:
-  Build(const std::string& path, const Parse& parse, Scene& scene) : parse_(parse) {
-    meshes_.resize(parse.meshes.list.size());
-    vertices_.resize(meshes_.size());
-    for (std::size_t i = 0; i < meshes_.size(); ++i) {
-      meshes_[i].name = parse.meshes.list[i].empty() ? scene.name : parse.meshes.list[i];
+  Build(const std::string& path, Reader& read, Scene& scene) : read_(read) {
+    scene.meshes.resize(read.meshes.size());
+    for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+      GrowingMesh grown = std::move(read.meshes[i]);  // gone before the next
+      scene.meshes[i].name = grown.name.empty() ? scene.name : std::move(grown.name);
+      fill(scene.meshes[i], grown);
     }
-    add_triangles(path);
-    for (std::size_t i = 0; i < meshes_.size(); ++i) fill(meshes_[i], vertices_[i]);
-    scene.meshes = std::move(meshes_);
     warn(path, scene.warnings);
   }
 
  private:
-  void add_triangles(const std::string& path) {
-    std::unordered_map<VertexKey, std::uint32_t, VertexHash> numbers;
-    numbers.reserve(parse_.positions.size());
-    std::vector<std::uint32_t> polygon;
-    std::vector<vec3> points;
-    std::vector<uvec3> split;
-    const Corner* corner = parse_.corners.data();
-    for (const Face& face : parse_.faces) {
-      Mesh& mesh = meshes_[face.mesh];
-      std::vector<Corner>& vertices = vertices_[face.mesh];
-      polygon.clear();
-      points.clear();
-      for (const Corner* const end = corner + face.corners; corner != end; ++corner) {
-        const auto [found, is_new] =
-            numbers.try_emplace({*corner, face.mesh}, static_cast<std::uint32_t>(vertices.size()));
-        if (is_new) {
-          vertices.push_back(*corner);
-          if (numbers.size() > most_vertices)
-            refuse(path, 0, "more than 2147483647 vertices; split the file");
-        }
-        polygon.push_back(found->second);
-        points.push_back(parse_.positions[static_cast<std::size_t>(corner->position)]);
-      }
-      if (face.corners == 3) {
-        split.assign(1, {0, 1, 2});
-      } else if (!split_polygon(points, split)) {
-        ++crossed_;
-      }
-      for (const uvec3& t : split) {
-        mesh.triangles.push_back({polygon[t.x], polygon[t.y], polygon[t.z]});
-        mesh.materials.push_back(face.material);
-      }
-    }
-  }
-
-  // Gives the mesh the vertices that were found for it, and drops what it does not need.
-  void fill(Mesh& mesh, const std::vector<Corner>& vertices) {
-    const auto has = [&](int Corner::*part) {
-      return std::any_of(vertices.begin(), vertices.end(), [&](const Corner& c) { return c.*part >= 0; });
+  // Gives the mesh what the file says of its vertices.
+  void fill(Mesh& mesh, GrowingMesh& grown) {
+    mesh.triangles = fitted(std::move(grown.triangles));
+    mesh.materials = fitted(std::move(grown.materials));
+    const std::vector<Corner>& vertices = grown.vertices;
+    const auto has = [&](Kind kind) {
+      return std::any_of(vertices.begin(), vertices.end(),
+                         [&](const Corner& c) { return c.index[kind] >= 0; });
     };
     mesh.positions.reserve(vertices.size());
     for (const Corner& c : vertices)
-      mesh.positions.push_back(parse_.positions[static_cast<std::size_t>(c.position)]);
-    if (has(&Corner::texture_coordinate)) {
+      mesh.positions.push_back(read_.positions[static_cast<std::size_t>(c.index[position])]);
+    if (has(texture_coordinate)) {
       mesh.texture_coordinates.reserve(vertices.size());
       for (const Corner& c : vertices) {
-        const bool given = c.texture_coordinate >= 0;
-        without_texture_coordinate_ += !given;
+        const std::int32_t index = c.index[texture_coordinate];
+        without_texture_coordinate_ += index < 0;
         mesh.texture_coordinates.push_back(
-            given ? parse_.texture_coordinates[static_cast<std::size_t>(c.texture_coordinate)] : vec2(0));
+            index < 0 ? vec2(0) : read_.texture_coordinates[static_cast<std::size_t>(index)]);
       }
     }
-    if (has(&Corner::normal)) fill_normals(mesh, vertices);
-    if (std::all_of(mesh.materials.begin(), mesh.materials.end(), [](std::uint32_t m) { return m == 0; })) {
-      std::vector<std::uint32_t>().swap(mesh.materials);
-    }
+    if (has(normal)) fill_normals(mesh, vertices);
+  }
+
+  /// Large vectors may have room to spare, which is not touched; many small ones may not.
+  template <class T>
+  static std::vector<T> fitted(std::vector<T>&& vector) {
+    if (vector.capacity() * sizeof(T) < 65536) vector.shrink_to_fit();
+    return std::move(vector);
   }
 
   void fill_normals(Mesh& mesh, const std::vector<Corner>& vertices) {
     std::vector<vec3> given(vertices.size(), vec3(0));
     std::size_t missing = 0, zero = 0;
     for (std::size_t i = 0; i < vertices.size(); ++i) {
-      if (vertices[i].normal < 0) {
+      const std::int32_t index = vertices[i].index[normal];
+      if (index < 0) {
         ++missing;
         continue;
       }
-      const dvec3 normal = parse_.normals[static_cast<std::size_t>(vertices[i].normal)];
+      const dvec3 normal = read_.normals[static_cast<std::size_t>(index)];
       const double length = glm::length(normal);
       if (length > 0) {
         given[i] = vec3(normal / length);
@@ -537,10 +639,6 @@ class Build {
   }
 
   void warn(const std::string& path, std::vector<std::string>& warnings) const {
-    if (crossed_ > 0) {
-      warnings.push_back(path + ": " + counted(crossed_, "polygon") +
-                         " twisted, crossing itself or without area, split as well as could be");
-    }
     if (zero_normals_ > 0) {
       warnings.push_back(path + ": " + counted(zero_normals_, "vertex normal") +
                          " of zero length made from the faces");
@@ -555,31 +653,112 @@ class Build {
     }
   }
 
-  const Parse& parse_;
-  std::vector<Mesh> meshes_;
-  std::vector<std::vector<Corner>> vertices_;  // of each mesh, in the order of their first use
-  std::size_t crossed_ = 0, zero_normals_ = 0, without_normal_ = 0, without_texture_coordinate_ = 0;
+  Reader& read_;
+  std::size_t zero_normals_ = 0, without_normal_ = 0, without_texture_coordinate_ = 0;
 };
 
-Parse scanned_and_parsed(const std::string& path, Scene& scene, std::vector<Scan::Library>& libraries) {
-  std::string text = read_text(path);
-  if (text.empty()) refuse(path, 0, "is empty; an OBJ file has lines like \"v 0 0 0\" and \"f 1 2 3\"");
-  Scan scan(path, text);
-  scene.warnings = std::move(scan.warnings);
-  libraries = std::move(scan.libraries);
-  return Parse(text, scan);
-}
+// The extension's statements.
+
+class Elements {
+ public:
+  Elements(const std::string& path, const Reader& read, const MaterialLibraries& libraries, Scene& scene)
+      : path_(path), read_(read), scene_(scene) {
+    for (const Element& element : read.elements) {
+      switch (element.what) {
+        case Element::What::camera:
+          add_camera(element);
+          break;
+        case Element::What::point_light:
+          add_light(element, libraries);
+          break;
+        case Element::What::plane:
+          add_plane(element);
+          break;
+        case Element::What::sphere:
+          add_sphere(element);
+          break;
+      }
+    }
+  }
+
+  bool camera_known() const { return cameras_ > 0; }
+
+ private:
+  [[noreturn]] void refuse_it(const Element& element, const std::string& what) const {
+    refuse(path_, element.line, what);
+  }
+
+  vec3 point(const Element& element, std::size_t i) const {
+    return read_.positions[static_cast<std::size_t>(element.index[i])];
+  }
+  dvec3 vector(const Element& element, std::size_t i) const {
+    return read_.normals[static_cast<std::size_t>(element.index[i])];
+  }
+
+  void add_camera(const Element& element) {
+    const Camera camera{point(element, 0), point(element, 1), vec3(0), Camera{}.field_of_view};
+    const dvec3 up = vector(element, 2), along = dvec3(camera.target) - dvec3(camera.eye);
+    if (along == dvec3(0)) refuse_it(element, "the camera looks at where it stands; name two points");
+    if (up == dvec3(0)) refuse_it(element, "the camera's up has no length; name another vn");
+    if (glm::length(glm::cross(glm::normalize(up), glm::normalize(along))) < 1e-6)
+      refuse_it(element, "the camera looks along its up; name another vn");
+    View view{"camera " + std::to_string(++cameras_), camera};
+    view.camera.up = vec3(glm::normalize(up));
+    if (cameras_ == 1) {
+      scene_.camera = view.camera;
+    } else {
+      scene_.views.push_back(std::move(view));
+    }
+  }
+
+  void add_light(const Element& element, const MaterialLibraries& libraries) {
+    Light& light = scene_.lights.emplace_back();
+    light.name = "light " + std::to_string(scene_.lights.size());
+    light.position = point(element, 0);
+    light.intensity = libraries.light_of(element.light_material).value_or(vec3(1));
+  }
+
+  void add_plane(const Element& element) {
+    const dvec3 normal = vector(element, 1);
+    if (normal == dvec3(0)) refuse_it(element, "the plane's normal has no length; name another vn");
+    Plane plane;
+    plane.normal = vec3(glm::normalize(normal));
+    plane.offset = static_cast<float>(glm::dot(dvec3(plane.normal), dvec3(point(element, 0))));
+    plane.material = element.material;
+    if (!std::isfinite(plane.offset))
+      refuse_it(element, "the plane lies beyond the largest float, 3.4e38; scale the model down");
+    scene_.planes.push_back(plane);
+  }
+
+  void add_sphere(const Element& element) {
+    const auto radius = static_cast<float>(glm::length(vector(element, 1)));
+    if (!(radius > 0)) refuse_it(element, "the sphere has no radius; it is the length of the first vn");
+    if (!std::isfinite(radius))
+      refuse_it(element, "the sphere's radius is beyond the largest float, 3.4e38; scale the model down");
+    scene_.spheres.push_back({point(element, 0), radius, element.material});
+  }
+
+  const std::string& path_;
+  const Reader& read_;
+  Scene& scene_;
+  std::size_t cameras_ = 0;
+};
 
 }  // namespace
 
-Scene load_obj(const std::string& path, const LoadOptions&) try {
+Scene load_obj(const std::string& path, const LoadOptions& given) try {
+  const LoadOptions options = within_folder_of(path, given);
   Scene scene;
   scene.name = std::filesystem::path(path).stem().string();
-  std::vector<Scan::Library> libraries;
-  const Parse parse = scanned_and_parsed(path, scene, libraries);  // the text is gone from here on
-  add_materials(path, parse.materials.list, read_libraries(path, libraries, scene.warnings), scene);
-  Build(path, parse, scene);
-  finish(scene, {0, 1, 0}, false);
+  bool camera_known = false;
+  {
+    Reader read(path, scene.warnings);
+    const MaterialLibraries libraries = read_libraries(path, read.libraries, options, scene.warnings);
+    add_materials(path, read.materials.list, libraries, options, scene);
+    camera_known = Elements(path, read, libraries, scene).camera_known();
+    Build(path, read, scene);
+  }
+  finish(scene, {0, 1, 0}, camera_known);
   return scene;
 } catch (const std::bad_alloc&) {
   refuse(path, 0, "does not fit into memory; split it");

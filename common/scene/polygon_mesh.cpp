@@ -8,10 +8,6 @@
 
 namespace trilha {
 
-std::string counted(std::uint64_t n, const std::string& what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-}
-
 vec3 unit_or_zero(const dvec3& normal) {
   const double length = glm::length(normal);
   return length > 0 ? vec3(normal / length) : vec3(0);

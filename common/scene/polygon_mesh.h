@@ -14,9 +14,6 @@ constexpr std::size_t most_vertices = 2147483647;
 constexpr std::size_t most_triangles = 4294967294;
 constexpr std::size_t most_corners = 10000;  ///< of a polygon: splitting takes time with their square
 
-/// "1 face", "2 faces".
-std::string counted(std::uint64_t n, const std::string& what);
-
 /// Makes room for one more, of `expected` in all: little where little has come so far, since what a file
 /// promises costs nothing to write. At most 9/8 of the vector's memory is ever in use: what is reserved and
 /// not yet written to takes none.

@@ -1,8 +1,13 @@
 #include "common/scene/scene.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "common/scene/made/turn.h"
 
 namespace trilha {
 namespace {
@@ -55,33 +60,121 @@ Camera framing(const Box& box, const vec3& up) {
 
 namespace {
 
-/// The solid angle of a triangle seen from the origin, in steradians; positive where its front is seen.
-double solid_angle(const dvec3& a, const dvec3& b, const dvec3& c) {
-  const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
-  const double below = la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
-  return -2 * std::atan2(glm::dot(a, glm::cross(b, c)), below);
-}
+/// What a ray from some point meets first.
+struct Seen {
+  double distance = INFINITY;
+  bool front = false;
+};
 
-/// How much of the sphere around the point is covered by front faces, less what back faces cover: 1 in a
-/// closed room, −1 in a closed body.
-double inwardness(const Scene& scene, const dvec3& point) {
-  double sum = 0;
+/// The first surface in each of the unit directions.
+std::vector<Seen> seen_from(const Scene& scene, const dvec3& point, const std::vector<dvec3>& directions) {
+  std::vector<Seen> all(directions.size());
+  const auto take_nearer = [](std::vector<Seen>& to, const std::vector<Seen>& from) {
+    for (std::size_t i = 0; i < to.size(); ++i)
+      if (from[i].distance < to[i].distance) to[i] = from[i];
+  };
   for_each_placed(scene, [&](const Mesh& mesh, const Instance* instance) {
-    const auto seen = [&](std::uint32_t i) {
+    const bool mirrored = instance != nullptr && mirrors(instance->transform);
+    const auto corner = [&](std::uint32_t i) {
       const dvec3 p = mesh.positions[i];
       return (instance == nullptr ? p : apply(instance->transform, p)) - point;
     };
-    const double sign = instance != nullptr && mirrors(instance->transform) ? -1 : 1;
-    for (const uvec3& t : mesh.triangles) sum += sign * solid_angle(seen(t.x), seen(t.y), seen(t.z));
+    const auto of_some = [&](const tbb::blocked_range<std::size_t>& range, std::vector<Seen> seen) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+        const uvec3& t = mesh.triangles[i];
+        const dvec3 a = corner(t.x), e1 = corner(t.y) - a, e2 = corner(t.z) - a;  // Möller & Trumbore 1997
+        const dvec3 normal = glm::cross(e1, e2), q = glm::cross(a, e1);
+        const double height = glm::dot(a, normal);
+        for (std::size_t k = 0; k < directions.size(); ++k) {
+          const double facing = glm::dot(directions[k], normal);  // below 0: the front
+          const double distance = height / facing;
+          if (!(distance >= 0 && distance < seen[k].distance)) continue;
+          const double u = glm::dot(a, glm::cross(directions[k], e2)) / facing;
+          const double v = glm::dot(directions[k], q) / facing;
+          if (u >= 0 && v >= 0 && u + v <= 1) seen[k] = {distance, (facing < 0) != mirrored};
+        }
+      }
+      return seen;
+    };
+    take_nearer(all, tbb::parallel_deterministic_reduce(
+                         tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096),
+                         std::vector<Seen>(directions.size()), of_some,
+                         [&](std::vector<Seen> one, const std::vector<Seen>& other) {
+                           take_nearer(one, other);
+                           return one;
+                         }));
   });
-  return sum / (4 * pi);
+  return all;
+}
+
+/// Is the first surface a front in `tenths` of the directions, and hardly ever a back, as within a body? Of a
+/// room that is so in more than half of them, which is what somebody on a plain sees.
+bool surrounded(const std::vector<Seen>& around, int tenths) {
+  std::ptrdiff_t fronts = 0, backs = 0;
+  for (const Seen& seen : around) (seen.front ? fronts : backs) += seen.distance < INFINITY;
+  const auto all = static_cast<std::ptrdiff_t>(around.size());
+  return 10 * fronts >= tenths * all && 10 * backs <= all;
+}
+
+/// n directions, evenly around (the spiral of the golden angle).
+std::vector<dvec3> around(int n) {
+  std::vector<dvec3> directions;
+  for (int i = 0; i < n; ++i) {
+    const double z = 1 - (2 * i + 1) / double(n), radius = std::sqrt(1 - z * z);
+    const auto [cosine, sine] = turn(137.50776405003785 * i);
+    directions.push_back({radius * cosine, radius * sine, z});
+  }
+  return directions;
 }
 
 }  // namespace
 
 Camera framing(const Scene& scene, const vec3& up) {
   const Box box = bounds(scene);
-  return framing(box, up);
+  const Camera outside = framing(box, up);
+  if (box.empty()) return outside;
+  const dvec3 size = dvec3(box.upper) - dvec3(box.lower), centre = dvec3(box.lower) + 0.5 * size;
+  const dvec3 above = glm::normalize(dvec3(up));
+  int along = -1, side = -1;  // the axes: the longest across `up`, and the other one
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(above[axis]) > 0.5) continue;
+    (along < 0 || size[axis] > size[along] ? (side = along, along) : side) = axis;
+  }
+  if (side < 0) return outside;
+  const auto room_at = [&](double off_centre, int tenths) {
+    dvec3 point = centre;
+    point[along] += off_centre * size[along];
+    return surrounded(seen_from(scene, point, around(16)), tenths);
+  };
+  if (!room_at(0, 7) && !(room_at(0.25, 9) && room_at(-0.25, 9))) return outside;
+
+  // From an end towards the other, as near to the wall behind as the view is free; of the two ends, the one
+  // that looks less out of the door.
+  const dvec3 eyes_height = -0.1 * above * std::abs(glm::dot(size, above));
+  std::vector<dvec3> directions = around(64);
+  directions.push_back(dvec3(0));
+  for (const double from_end : {0.04, 0.08, 0.15, 0.25, 0.35, 0.5})
+    for (const double aside : {0.0, 0.12, -0.12, 0.25, -0.25}) {
+      Camera best = outside;
+      int most = 0;
+      for (const double sign : {1.0, -1.0}) {
+        dvec3 eye = centre + eyes_height, look(0);
+        eye[along] += sign * (0.5 - from_end) * size[along];
+        eye[side] += aside * size[side];
+        look[along] = -sign;
+        directions.back() = look;
+        const std::vector<Seen> seen = seen_from(scene, eye, directions);
+        if (!surrounded(seen, 4) || seen.back().distance < 0.3 * size[along]) continue;
+        int met = 0;
+        for (std::size_t i = 0; i < seen.size(); ++i)
+          met += glm::dot(directions[i], look) > 0.7 && seen[i].distance < INFINITY;
+        if (met <= most) continue;
+        most = met;
+        best = {rounded(eye), rounded(eye + look * (0.5 * size[along])), vec3(above), 60};
+      }
+      if (most > 0) return best;
+    }
+  return outside;
 }
 
 Camera for_aspect(Camera camera, double aspect) {
@@ -175,15 +268,20 @@ SceneFeatures features_of(const Scene& scene) {
     used[material] = true;
     features.materials |= material != 0;
   };
+  std::vector<bool> as_it_is(scene.meshes.size(), false);  // placed somewhere with materials of its own
   for_each_placed(scene, [&](const Mesh& mesh, const Instance* instance) {
     if (mesh.triangles.empty()) return;
-    if (instance != nullptr && instance->material >= 0) use(static_cast<std::uint32_t>(instance->material));
-  });
-  for (const Mesh& mesh : scene.meshes) {
     features.normals |= !mesh.normals.empty();
     features.texture_coordinates |= !mesh.texture_coordinates.empty();
-    if (mesh.materials.empty() && !mesh.triangles.empty()) use(0);
-    for (const std::uint32_t material : mesh.materials) use(material);
+    if (instance != nullptr && instance->material >= 0)
+      use(static_cast<std::uint32_t>(instance->material));
+    else
+      as_it_is[static_cast<std::size_t>(&mesh - scene.meshes.data())] = true;
+  });
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    if (!as_it_is[i]) continue;
+    if (scene.meshes[i].materials.empty()) use(0);
+    for (const std::uint32_t material : scene.meshes[i].materials) use(material);
   }
   for (const Sphere& sphere : scene.spheres) use(sphere.material);
   for (const Plane& plane : scene.planes) use(plane.material);

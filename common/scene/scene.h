@@ -151,9 +151,10 @@ std::size_t bytes(const Scene& scene);
 /// wide as high. `up` is the axis that points up.
 Camera framing(const Box& box, const vec3& up);
 
-/// A camera for the scene: inside it, looking along its longest way, where it is a room; else framing() of
-/// its bounds. A room is what has its front faces turned inwards around its middle: the solid angles of its
-/// triangles there (van Oosterom & Strackee 1983), front faces positive, sum up to half a sphere or more.
+/// A camera for the scene: inside it, looking along its longest way across `up` from where the view is free,
+/// where it is a room; else framing() of its bounds. A room is where front faces are what is seen from the
+/// middle in seven of ten directions, or, where something stands in the middle, from halfway to both ends in
+/// nine of ten.
 Camera framing(const Scene& scene, const vec3& up);
 
 /// The camera for an image of that aspect (width over height): where that is higher than wide, the field of

@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,10 +24,11 @@ enum class TextureUse : std::uint8_t { colour, data };
 enum class Wrap : std::uint8_t { repeat, clamp, mirror };
 
 /// width × height texels of red, green, blue, alpha, row by row from the top. One of the vectors is filled.
+/// Colours are not multiplied with alpha.
 struct TextureLevel {
   int width = 0, height = 0;
   std::vector<u8vec4> bytes;  ///< of what files hold in eight bits; colours encoded as sRGB
-  std::vector<vec4> floats;   ///< of all else: linear, alpha in [0, 1]
+  std::vector<vec4> floats;   ///< of all else: linear, at most 1e30, alpha in [0, 1]
 };
 
 /// An image that a material names, with its mip chain. Texture coordinate (0, 0) is the lower left corner of
@@ -37,7 +40,10 @@ struct Texture {
   bool has_alpha = false;  ///< a texel is not opaque
   bool missing = false;    ///< its file could not be found: magenta and black squares
   /// Largest first; each half as wide and high as the one before, rounded down, at least 1; the last is 1×1.
-  /// A texel is the mean of the area it covers, taken in linear light where the texture holds colours.
+  /// A texel is the mean of the area that it covers of the level before, texels that it covers in part
+  /// counting by that part, so that the last is the mean of all; in linear light where the texture holds
+  /// colours, whose alpha weighs them then: a colour that cannot be seen is in no mean. Bytes are rounded
+  /// once, from means in floats, to the nearest in the encoding that they are stored in.
   std::vector<TextureLevel> levels;
 
   std::size_t bytes() const;
@@ -49,7 +55,7 @@ vec4 texel(const Texture& texture, int level, int x, int y);
 /// The mean of the whole texture in linear light: its smallest level.
 vec4 mean(const Texture& texture);
 
-/// A texture with its whole mip chain from texels in eight bits, row by row from the top.
+/// A texture with its whole mip chain from width × height texels in eight bits, row by row from the top.
 Texture make_texture(std::string name, int width, int height, std::vector<u8vec4> texels, TextureUse use);
 
 /// Gathers the textures of a scene while it is read: an image is decoded once for each use that is made of
@@ -65,19 +71,31 @@ class TextureSet {
 
   /// The number in Scene::textures of the image in that file, which line `line` of the file `path` names (0:
   /// no line applies); −1 where textures are not wanted. A file that does not exist becomes the magenta
-  /// texture, with a warning. Throws InputError where the image is refused (Limits: sides of 16384, 2²⁶
-  /// texels, and a file of n bytes has at most 2²⁰ + 64·n texels; all textures of a scene have 2²⁸ at most).
+  /// texture, with one warning. Throws InputError, "FILE: cannot be read: …", where decode() does, where the
+  /// file is a folder, no regular file or may not be read, or holds numbers that are not finite.
+  ///
+  /// Limits, asked of the header: sides of 16384, 2²⁶ texels; a file of n bytes has at most 2²⁰ + 1024·n
+  /// texels of bytes, or a quarter as many of floats: what deflate can make of n bytes, so that a PNG of one
+  /// colour passes and a file of a kilobyte cannot ask for more than 8 MB; 2²⁸ texels in all of a scene.
   std::int32_t add(const std::filesystem::path& file, const How& how, const std::string& path,
                    std::size_t line);
 
-  /// The same for an image that lies inside the file `path` (glTF); `name` tells it from others there.
+  /// The same for an image that lies inside the file `path` (glTF); `name` tells it from others there. What
+  /// is refused is called "PATH:LINE: image 'NAME' cannot be read: …".
   std::int32_t add(const std::string& name, std::string_view encoded, const How& how, const std::string& path,
                    std::size_t line);
 
  private:
+  std::int32_t number(const std::string& image, const std::string& label, const How& how,
+                      const std::function<Texture()>& make);
+  long long texels_so_far();  // of the scene, in the largest levels
+
   Scene& scene_;
   const LoadOptions& options_;
-  std::map<std::string, std::int32_t> numbers_;  // by file and use
+  std::map<std::string, std::int32_t> numbers_;  // by image, use and wraps
+  std::set<std::string> missing_;                // images that a warning was given for
+  std::size_t counted_ = 0;                      // textures of the scene in texels_
+  long long texels_ = 0;
 };
 
 }  // namespace trilha

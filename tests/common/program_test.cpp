@@ -78,7 +78,7 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
       {"--scene good.obj --backend gpu", 2, "cuda"},
       {"--scene good.obj --time 1 --samples 2", 2, "--samples"},
       {"--scene good.obj --config missing.ini", 1, "missing.ini"},
-      {"--scene good.obj --config bad.ini", 2, "no-such-flag"},
+      {"--scene good.obj --config bad.ini", 1, "no-such-flag"},
       {"--scene good.obj --sweep test", 2, "name=value"},
       {"--scene good.obj --sweep no-such-setting=1", 2, "shading"},
       {"--scene good.obj --sweep test=plane,no-such-test", 2, "watertight"},

@@ -3,22 +3,16 @@
 
 #include "common/scene/library.h"
 #include "common/scene/made.h"
+#include "common/scene/made/solids.h"
 #include "common/scene/made/turn.h"
 #include "common/scene/newell.h"
 
 namespace trilha {
 namespace {
 
-Material coloured(const char* name, const vec3& diffuse) {
-  Material material;
-  material.name = name;
-  material.diffuse = diffuse;
-  return material;
-}
-
-Mesh tea_ware(const char* name) {
-  constexpr int quads = 10;  // a patch's side
-  Mesh mesh = tessellate(load_bpt((root_folder() / "assets" / "newell" / name).string() + ".bpt"), quads);
+Mesh tea_ware(const char* name, const Parameters& parameters) {
+  Mesh mesh = tessellate(load_bpt((root_folder() / "assets" / "newell" / name).string() + ".bpt"),
+                         parameters.whole("quads"));
   mesh.name = name;
   return mesh;
 }
@@ -55,16 +49,17 @@ void fill(Mesh& cup) {
   cup.normals.resize(cup.positions.size(), vec3(0, 1, 0));
 }
 
-Scene teapot(const Parameters&) {
+Scene teapot(const Parameters& parameters) {
   Scene scene;
   scene.name = "teapot";
-  scene.meshes = {tea_ware("teapot")};
+  scene.meshes = {tea_ware("teapot", parameters)};
   scene.materials = {coloured("porcelain", {0.8f, 0.78f, 0.72f})};
-  finish(scene, {0, 0, 1}, false);
+  scene.camera = {{5.6f, -9.6f, 5.4f}, {0.2f, 0, 1.4f}, {0, 0, 1}, 29};
+  finish(scene, {0, 0, 1}, true);
   return scene;
 }
 
-Scene teaset(const Parameters&) {
+Scene teaset(const Parameters& parameters) {
   Scene scene;
   scene.name = "teaset";
   scene.materials = {coloured("porcelain", {0.8f, 0.78f, 0.72f}), coloured("silver", {0.6f, 0.6f, 0.62f}),
@@ -82,11 +77,11 @@ Scene teaset(const Parameters&) {
   floor.normals.assign(4, vec3(0, 0, 1));
   floor.triangles = {{0, 1, 2}, {0, 2, 3}};
   add(floor, "floor", cloth);
-  add(stood(tea_ware("teapot"), turned(2, -15), 1, 0, 0.8), "teapot", porcelain);
+  add(stood(tea_ware("teapot", parameters), turned(2, -15), 1, 0, 0.8), "teapot", porcelain);
 
-  Mesh cup = tea_ware("teacup");
+  Mesh cup = tea_ware("teacup", parameters);
   fill(cup);
-  const Mesh spoon = tea_ware("teaspoon");
+  const Mesh spoon = tea_ware("teaspoon", parameters);
   const glm::dmat3 upright = turned(0, 90);   // the cup comes with y up
   const glm::dmat3 leaning = turned(0, 3.4);  // so that the spoon rests on its bowl and on its tip
   const auto add_cover = [&](const std::string& number, double x, double y, double cup_turn, double spoon_x,
@@ -104,8 +99,10 @@ Scene teaset(const Parameters&) {
 }  // namespace
 
 std::vector<MadeScene> tea_scenes() {
-  return {{"teaset", "Newell's teapot with two cups and two spoons on a cloth", {}, teaset},
-          {"teapot", "Newell's teapot alone", {}, teapot}};
+  // At one quad a patch, the two halves of a handle coincide.
+  const Parameter quads{"quads", "on a patch's side", 10, 2, 100};
+  return {{"teaset", "Newell's teapot with two cups and two spoons on a cloth", {quads}, teaset},
+          {"teapot", "Newell's teapot alone", {quads}, teapot}};
 }
 
 }  // namespace trilha

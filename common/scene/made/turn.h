@@ -1,6 +1,6 @@
 #pragma once
-// Turning things the same way on every machine: the C library's sin and cos differ between processors in their
-// last bit, sums and products do not.
+// Turning things the same way on every machine: the C library's sin and cos differ between processors in
+// their last bit, sums and products do not.
 
 #include <cmath>
 
@@ -26,10 +26,14 @@ inline Turn turn(double degrees) {
   }
   sine *= x;
   switch ((static_cast<int>(quarter) + 4) % 4) {
-    case 0: return {cosine, sine};
-    case 1: return {-sine, cosine};
-    case 2: return {-cosine, -sine};
-    default: return {sine, -cosine};
+    case 0:
+      return {cosine, sine};
+    case 1:
+      return {-sine, cosine};
+    case 2:
+      return {-cosine, -sine};
+    default:
+      return {sine, -cosine};
   }
 }
 
