@@ -66,9 +66,18 @@ struct Seen {
   bool front = false;
 };
 
-/// The first surface in each of the unit directions.
+/// The first surface in each of the unit directions. A triangle a, b, c is met where d·(a×b), d·(b×c) and
+/// d·(c×a) have one sign, seen from the point: below 0, its front. Few are; so the signs are all that is
+/// computed of most, for all directions at once.
 std::vector<Seen> seen_from(const Scene& scene, const dvec3& point, const std::vector<dvec3>& directions) {
-  std::vector<Seen> all(directions.size());
+  const std::size_t count = directions.size();
+  std::vector<double> x, y, z;
+  for (const dvec3& d : directions) {
+    x.push_back(d.x);
+    y.push_back(d.y);
+    z.push_back(d.z);
+  }
+  std::vector<Seen> all(count);
   const auto take_nearer = [](std::vector<Seen>& to, const std::vector<Seen>& from) {
     for (std::size_t i = 0; i < to.size(); ++i)
       if (from[i].distance < to[i].distance) to[i] = from[i];
@@ -80,29 +89,37 @@ std::vector<Seen> seen_from(const Scene& scene, const dvec3& point, const std::v
       return (instance == nullptr ? p : apply(instance->transform, p)) - point;
     };
     const auto of_some = [&](const tbb::blocked_range<std::size_t>& range, std::vector<Seen> seen) {
+      std::vector<double> same_sign(count);
       for (std::size_t i = range.begin(); i != range.end(); ++i) {
         const uvec3& t = mesh.triangles[i];
-        const dvec3 a = corner(t.x), e1 = corner(t.y) - a, e2 = corner(t.z) - a;  // Möller & Trumbore 1997
-        const dvec3 normal = glm::cross(e1, e2), q = glm::cross(a, e1);
-        const double height = glm::dot(a, normal);
-        for (std::size_t k = 0; k < directions.size(); ++k) {
-          const double facing = glm::dot(directions[k], normal);  // below 0: the front
-          const double distance = height / facing;
-          if (!(distance >= 0 && distance < seen[k].distance)) continue;
-          const double u = glm::dot(a, glm::cross(directions[k], e2)) / facing;
-          const double v = glm::dot(directions[k], q) / facing;
-          if (u >= 0 && v >= 0 && u + v <= 1) seen[k] = {distance, (facing < 0) != mirrored};
+        const dvec3 a = corner(t.x), b = corner(t.y), c = corner(t.z);
+        const dvec3 ab = glm::cross(a, b), bc = glm::cross(b, c), ca = glm::cross(c, a);
+        double met = 0;
+        for (std::size_t k = 0; k < count; ++k) {
+          const double s = x[k] * ab.x + y[k] * ab.y + z[k] * ab.z,
+                       u = x[k] * bc.x + y[k] * bc.y + z[k] * bc.z,
+                       v = x[k] * ca.x + y[k] * ca.y + z[k] * ca.z;
+          same_sign[k] = min(s, min(u, v)) >= 0 ? 1 : max(s, max(u, v)) <= 0 ? -1 : 0;
+          met = max(met, same_sign[k] * same_sign[k]);
+        }
+        if (met == 0) continue;
+        const dvec3 normal = glm::cross(b - a, c - a);
+        for (std::size_t k = 0; k < count; ++k) {
+          if (same_sign[k] == 0) continue;
+          const double distance = glm::dot(a, normal) / glm::dot(directions[k], normal);
+          if (distance >= 0 && distance < seen[k].distance)
+            seen[k] = {distance, (same_sign[k] < 0) != mirrored};
         }
       }
       return seen;
     };
-    take_nearer(all, tbb::parallel_deterministic_reduce(
-                         tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096),
-                         std::vector<Seen>(directions.size()), of_some,
-                         [&](std::vector<Seen> one, const std::vector<Seen>& other) {
-                           take_nearer(one, other);
-                           return one;
-                         }));
+    take_nearer(all,
+                tbb::parallel_deterministic_reduce(
+                    tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), std::vector<Seen>(count),
+                    of_some, [&](std::vector<Seen> one, const std::vector<Seen>& other) {
+                      take_nearer(one, other);
+                      return one;
+                    }));
   });
   return all;
 }
