@@ -68,7 +68,7 @@ class Hall {
   }
 
  private:
-  /// How many pieces something is cut into that takes `usual` of them at detail 4.
+  /// How many pieces something is cut into. The divisor makes the hall of detail 4 as large as Sponza.
   int pieces(double usual, int least = 1) const {
     return std::max(least, static_cast<int>(std::floor(usual * detail_ / 4.95 + 0.5)));
   }
@@ -522,8 +522,7 @@ void Hall::make_aisles() {
   wall.wall({-half, -0.15}, {half, 8.1}, outer_wall, wall_stone, opening, true, false);
   wall.material(of(HallTexture::limestone));
   const double face = outer_wall / 2;
-  Profile hood({face + 0.07, 0.02});
-  hood = Profile({face - 0.02, -0.16});
+  Profile hood({face - 0.02, -0.16});
   hood.line({face + 0.05, -0.16}).arc({face + 0.05, 0.0}, 0.6, pieces(4, 2)).line({face - 0.02, 0.0});
   for (const Path& path : light.paths({0, light_spring, 0}, {1, 0, 0}, n))
     wall.sweep(path, hood, {stone, stone});
@@ -554,8 +553,7 @@ void Hall::make_aisles() {
   const double end = half_ - 0.05;
   dado.quad({-end - 0.1, 0, 0.02}, {2 * end + 0.2, 0, 0}, {0, 1.4, 0}, period(HallTexture::azulejo));
   dado.material(of(HallTexture::limestone));
-  Profile rail({0.05, 0});
-  rail = Profile({0.05, 1.48});
+  Profile rail({0.05, 1.48});
   rail.line({-0.05, 1.48}).arc({-0.05, 1.40}, 0.8, pieces(3, 2)).line({0.05, 1.40});
   dado.sweep(straight({-end - 0.1, 0, 0}, {end + 0.1, 0, 0}, {0, 1, 0}), rail, {stone, stone});
   place_on_both_sides(add(dado), {0, 0, -outer_face});
@@ -603,6 +601,13 @@ void Hall::make_ends() {
     wall.material(of(HallTexture::voussoir));
     for (const Path& path : arch.paths({0, above, 0}, {1, 0, 0}, n))
       wall.sweep(path, profile, {pair, 0.7}, 0.25);
+    // The stones stand on imposts.
+    wall.material(of(HallTexture::limestone));
+    for (const double x : {-arch.half, arch.half}) {
+      const double a = x < 0 ? x - width - 0.1 : x - 0.14, b = x < 0 ? x + 0.14 : x + width + 0.1;
+      wall.box({a, above - 0.2, -out - 0.06}, {b, above, out + 0.06}, stone);
+      wall.box({a + 0.04, above - 0.34, -out - 0.02}, {b - 0.04, above - 0.18, out + 0.02}, stone);
+    }
   };
 
   // Where one comes in: a door, and a rose above it.
@@ -617,8 +622,7 @@ void Hall::make_ends() {
   archivolt(entrance, door, 3.1, 0.45);
   entrance.material(of(HallTexture::limestone));
   const int around = pieces_around(40);
-  Profile moulding({face + 0.02, -0.3});
-  moulding = Profile({face - 0.02, -0.28});
+  Profile moulding({face - 0.02, -0.28});
   moulding.line({face + 0.06, -0.28}).arc({face + 0.06, -0.12}, 0.7, pieces(4, 2)).line({face + 0.02, -0.02});
   moulding.line({face - 0.02, -0.02});
   entrance.sweep(ring({0, rose_y, 0}, rose, {1, 0, 0}, {0, 1, 0}, around), moulding, {stone, stone});
@@ -669,8 +673,7 @@ void Hall::make_ends() {
   apse.material(of(HallTexture::white_marble));
   apse.box({-1.25, dais, 0}, {1.25, dais + 1.2, deep / 2 + 0.03}, period(HallTexture::white_marble), 4 | 16);
   apse.material(of(HallTexture::limestone));
-  Profile string({0.02, 0});
-  string = Profile({0.1, 2.22});
+  Profile string({0.1, 2.22});
   string.line({-0.08, 2.22}).arc({-0.08, 2.1}, 0.8, pieces(4, 2)).line({0.1, 2.1});
   apse.sweep(straight({-1.25, 0, deep / 2}, {1.25, 0, deep / 2}, {0, 1, 0}), string, {stone, stone});
   Profile hood({deep / 2 - 0.02, -0.14});
@@ -808,8 +811,7 @@ void Hall::make_gallery() {
   // A bracket under it.
   MeshBuilder bracket("bracket");
   const double top = walkway - 0.24;
-  Profile side({0.05, top - 0.62});
-  side = Profile({-0.72, top + 0.02});
+  Profile side({-0.72, top + 0.02});
   side.line({-0.72, top - 0.12})
       .arc({-0.56, top - 0.22}, 0.35, pieces(4, 2))
       .arc({-0.14, top - 0.46}, -0.4, pieces(6, 2));
@@ -889,10 +891,8 @@ void Hall::make_furniture() {
     // across the band is up here: its frame is turned by a quarter
     Path path = ring({0, y, 0}, r, {0, 0, 1}, {1, 0, 0}, pieces_around(48));
     for (PathNode& node : path) {
-      const dvec3 out = -node.up;
       node.up = dvec3(0, 1, 0);
       node.across = glm::cross(node.up, node.tangent);
-      (void)out;
     }
     lamp.sweep(path, band, {1, 1});
   };
@@ -918,6 +918,12 @@ void Hall::make_furniture() {
     lamp.sweep(straight({0.16 * s, hub, 0.16 * c}, {0, hub + 0.35, 0}, {s, 1, c}),
                Profile::circle(0.008, pieces(4, 3)), {1, 1});
   }
+  const auto hook = [&](MeshBuilder& builder, double y, double r) {  // where a cable ends
+    Profile ball({0, y - r});
+    ball.arc({0, y + r}, 1, pieces(6, 3));
+    builder.lathe(ball, pieces(8, 4), 1, r);
+  };
+  hook(lamp, hub + 0.33, 0.035);
   const std::uint32_t lamp_mesh = add(lamp);
   const auto cable = [&](const char* name, double from, double to, double r) {
     MeshBuilder builder(name);
@@ -951,6 +957,7 @@ void Hall::make_furniture() {
     glass.sweep(straight({0.136 * s, 0.09, 0.136 * c}, {0, 0.75, 0}, {s, 1, c}), Profile::circle(0.004, 3),
                 {1, 1});
   }
+  hook(glass, 0.73, 0.022);
   const std::uint32_t glass_mesh = add(glass);
   const double arcade_lamp = 3.9, aisle_lamp = 3.5;
   const std::uint32_t short_cable = cable("arcade cable", arcade_lamp + 0.7, spring + arcade_rise, 0.006);
@@ -975,7 +982,6 @@ void Hall::make_furniture() {
     return dvec3(1.1 * (s - 0.5) * (1 - 0.03 * t), -3.2 * t, z);
   });
   banner.material(brass);
-  Profile pole({0, 0});
   banner.sweep(straight({-0.68, 0.0, 0}, {0.68, 0.0, 0}, {0, 1, 0}), Profile::circle(0.022, pieces(8, 4)),
                {1, 1});
   for (const double x : {-0.7, 0.7}) {
@@ -1090,14 +1096,14 @@ Scene hall(const Parameters& parameters) { return Hall(parameters).make(); }
 
 // Triangles with 8 bays (Sponza has 66 445 as Dabrovic made it, 262 267 as Crytek did):
 //
-//     detail      1       2        3        4        6        8        12         16         24
-//     triangles   67 240  91 917   167 075  259 324  584 582  989 905  2 188 005  3 840 118  8 527 872
+//     detail      1       2       3        4        6        8        12         16         26
+//     triangles   67 896  92 573  168 221  261 100  588 878  998 191  2 206 721  3 872 974  10 217 064
 //
-// At detail 1 much is cut as coarsely as it can be, so that fewer bays make it smaller: 3 have 29 928. A bay
-// more is 29 thousand triangles at detail 4.
+// At detail 1 much is cut as coarsely as it can be, so that fewer bays make it smaller: 3 have 30 232. A bay
+// more is 31 thousand triangles at detail 4.
 std::vector<MadeScene> hall_scenes() {
   return {{"hall",
-           "a vaulted hall of columns in the sun; detail=1: 67 thousand triangles, 4: 259 thousand, 26: 10 "
+           "a vaulted hall of columns in the sun; detail=1: 68 thousand triangles, 4: 261 thousand, 26: 10 "
            "million",
            {{"detail", "how finely it is cut; triangles grow with its square", 4, 1, 26, false},
             {"angle", "degrees by which it is turned about the vertical", 0, -360, 360, false},
