@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/math/random.h"
-#include "common/scene/made/turn.h"
+#include "common/math/turn.h"
 
 namespace trilha {
 namespace {

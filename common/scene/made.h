@@ -38,7 +38,7 @@ struct MadeScene {
   const char* what;  ///< for people, in a few words
   std::vector<Parameter> parameters;
   /// Makes it: the same bits for the same parameters, on any machine (so no sin, cos or pow of the C library:
-  /// common/scene/made/turn.h has them).
+  /// common/math/turn.h has them).
   Scene (*make)(const Parameters&);
 };
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/scene/made/turn.h"
+#include "common/math/turn.h"
 
 namespace trilha {
 namespace {

@@ -12,10 +12,10 @@
 
 #include "common/error.h"
 #include "common/image/files.h"
+#include "common/math/turn.h"
 #include "common/scene/gltf.h"
 #include "common/scene/json.h"
 #include "common/scene/made.h"
-#include "common/scene/made/turn.h"
 #include "common/scene/obj.h"
 #include "common/scene/off.h"
 #include "common/scene/ply.h"

@@ -11,10 +11,10 @@
 #include <set>
 
 #include "common/math/random.h"
+#include "common/math/turn.h"
 #include "common/scene/flatten.h"
 #include "common/scene/made.h"
 #include "common/scene/made/hall_textures.h"
-#include "common/scene/made/turn.h"
 
 using namespace trilha;
 

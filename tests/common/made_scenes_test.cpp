@@ -16,6 +16,7 @@
 
 #include "common/error.h"
 #include "common/math/random.h"
+#include "common/math/turn.h"
 #include "common/scene/extreme.h"
 #include "common/scene/flatten.h"
 #include "common/scene/library.h"
@@ -23,7 +24,6 @@
 #include "common/scene/made/elephant.h"
 #include "common/scene/made/solids.h"
 #include "common/scene/made/terrain.h"
-#include "common/scene/made/turn.h"
 #include "tests/testing.h"
 
 using namespace trilha;

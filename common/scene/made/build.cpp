@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/made/turn.h"
+#include "common/math/turn.h"
 
 namespace trilha {
 namespace {

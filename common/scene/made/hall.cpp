@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/turn.h"
 #include "common/scene/made.h"
 #include "common/scene/made/build.h"
 #include "common/scene/made/hall_textures.h"
-#include "common/scene/made/turn.h"
 
 namespace trilha {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "common/math/turn.h"
 #include "common/scene/extreme.h"
-#include "common/scene/made/turn.h"
 
 namespace trilha {
 

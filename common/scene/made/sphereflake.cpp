@@ -3,9 +3,9 @@
 
 #include <cmath>
 
+#include "common/math/turn.h"
 #include "common/scene/made/shapes.h"
 #include "common/scene/made/solids.h"
-#include "common/scene/made/turn.h"
 
 namespace trilha {
 namespace {

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/turn.h"
 #include "common/scene/library.h"
 #include "common/scene/made.h"
 #include "common/scene/made/solids.h"
-#include "common/scene/made/turn.h"
 #include "common/scene/newell.h"
 
 namespace trilha {

@@ -1,8 +1,8 @@
 #include <numeric>
 
+#include "common/math/turn.h"
 #include "common/scene/made/shapes.h"
 #include "common/scene/made/solids.h"
-#include "common/scene/made/turn.h"
 
 namespace trilha {
 namespace {

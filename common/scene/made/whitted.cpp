@@ -2,10 +2,10 @@
 // objects, lights and triangles of each, and how they are spread. Places, colours, lights and cameras are
 // ours: the files are lost, and their pictures are not described.
 
+#include "common/math/turn.h"
 #include "common/scene/made.h"
 #include "common/scene/made/elephant.h"
 #include "common/scene/made/solids.h"
-#include "common/scene/made/turn.h"
 
 namespace trilha {
 namespace {
