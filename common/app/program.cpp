@@ -139,6 +139,7 @@ void measure(Demo& demo, const Scene& scene, const Stream& stream, Options optio
   options.quiet = true;
   for (Saving& saving : savings) {
     const Omission& omission = saving.omission;
+    if (!omission.keep) continue;  // it was not loaded
     std::vector<double> ms[2];
     double bytes[2] = {};
     for (int turn = 0; turn < 6 && !interrupted(); ++turn)
@@ -160,6 +161,23 @@ void measure(Demo& demo, const Scene& scene, const Stream& stream, Options optio
     saving.bytes = bytes[true] - bytes[false];
     saving.ms = quartiles(ms[true]).median - quartiles(ms[false]).median;
   }
+}
+
+/// The same for what was not even loaded: five turns of loading all and loading what the chapter reads.
+void measure_loading(const Options& options, const LoadOptions& reads, Saving& saving) {
+  std::vector<double> ms[2];
+  for (int turn = 0; turn < 6 && !interrupted(); ++turn)
+    for (const bool kept : {true, false}) {
+      const auto start = Clock::now();
+      const Scene scene = load(options, kept ? LoadOptions{} : reads);
+      if (turn > 0) ms[kept].push_back(milliseconds_since(start));  // the first is the warm-up
+      const auto size = static_cast<double>(bytes(scene));
+      saving.bytes = kept ? size : *saving.bytes - size;
+    }
+  if (ms[0].size() < 5 || ms[1].size() < 5)
+    saving.bytes.reset();
+  else
+    saving.ms = quartiles(ms[true]).median - quartiles(ms[false]).median;
 }
 
 std::string with_unit(double bytes) {
@@ -369,13 +387,24 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   Outcome outcome = build(demo, scene, stream);
   outcome.load_ms = load_ms;
   std::vector<Saving> savings;
+  if (const std::size_t images = scene.images_not_read; images > 0)
+    savings.push_back(
+        {{images == 1 ? "an image of the scene" : std::to_string(images) + " images of the scene",
+          "this chapter reads none with these settings",
+          {},
+          {}},
+         {},
+         {}});
   for (const Omission& omission : demo.omissions()) savings.push_back({omission, {}, {}});
   {
     Film film(stream, options.width, options.height);
     render(demo, scene, stream, options, film, outcome);
     write_image(options.output, demo.develop(film, stream));
   }
-  if (options.explain) measure(demo, scene, stream, options, outcome, savings);
+  if (options.explain) {
+    if (scene.images_not_read > 0) measure_loading(options, demo.reads(), savings.front());
+    measure(demo, scene, stream, options, outcome, savings);
+  }
   if (options.json)
     print_json(demo, settings, scene, stream, options, outcome, savings);
   else if (!options.quiet)

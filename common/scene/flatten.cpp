@@ -3,14 +3,13 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <limits>
 
 #include "common/error.h"
 
 namespace trilha {
 namespace {
 
-constexpr std::size_t most = std::numeric_limits<std::uint32_t>::max() - 1;
+constexpr std::size_t most = most_triangles;  // and vertices
 
 /// Refuses what 32-bit numbers cannot name or memory cannot hold.
 void check_size(const Scene& scene, const MeshParts& parts) {

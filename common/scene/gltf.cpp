@@ -36,10 +36,6 @@ constexpr std::int64_t most_elements = 4294967294;          // what 32 bits numb
 constexpr std::int64_t most_bytes = std::int64_t{1} << 53;  // up to there a double is a whole number
 constexpr std::size_t most_per_byte = 4;  // triangles: a strip of bytes has one, and bytes may be shared
 
-std::string counted(std::size_t n, const std::string& what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-}
-
 /// The name without what would break a line of output.
 std::string plain(std::string name) {
   for (char& c : name)
@@ -733,7 +729,11 @@ class Materials {
     if (!of->has(key)) return {};
     const Item info = of.part(key);
     const std::size_t number = file_.index(info, "index", List::textures);
-    if (!file_.options.textures) return {};
+    if (!file_.options.textures) {
+      const Texture unread = read_texture(file_.item(List::textures, number));
+      if (unread.image >= 0) scene_.images_not_read += not_read_.insert(unread.image).second;
+      return {};
+    }
     const Item transform = info.extension("KHR_texture_transform");
     const std::int64_t coordinates =
         transform->whole("texCoord", info->whole("texCoord", 0, 0, 1000), 0, 1000);
@@ -815,6 +815,7 @@ class Materials {
   Scene& scene_;
   TextureSet set_;
   std::map<std::int64_t, std::uint32_t> numbers_;
+  std::set<std::int64_t> not_read_;
   std::vector<std::optional<Texture>> known_;
   std::map<std::tuple<std::int64_t, TextureUse, Wrap, Wrap>, std::int32_t> loaded_;
   std::size_t other_coordinates_ = 0, turned_ = 0, without_image_ = 0, infinite_indices_ = 0;
@@ -993,7 +994,7 @@ class Meshes {
       return std::any_of(sources.begin(), sources.end(), [&](const Source& s) { return s.*part != nullptr; });
     };
     const bool has_normals = has(&Source::normals), has_coordinates = has(&Source::coordinates);
-    std::size_t missing = 0, zero = 0;
+    std::size_t missing = 0;
     for (const Source& source : sources) {
       const std::vector<std::uint32_t> used = renumber(source, mesh.positions.size(), mesh.triangles);
       if (mesh.positions.size() + used.size() > most_elements)
@@ -1012,22 +1013,14 @@ class Meshes {
       if (has_normals) {
         for (const std::uint32_t vertex : used) {
           if (source.normals == nullptr) break;
-          const dvec3 normal(value(*source.normals, vertex));
-          const double length = glm::length(normal);
-          zero += !(length > 0);
-          mesh.normals.push_back(length > 0 ? vec3(normal / length) : vec3(0));
+          mesh.normals.push_back(unit_or_zero(dvec3(value(*source.normals, vertex))));
         }
         if (source.normals == nullptr) missing += used.size();
         mesh.normals.resize(mesh.positions.size(), vec3(0));
       }
     }
-    if (missing + zero == 0) return;
-    const std::vector<vec3> given = std::move(mesh.normals);
-    make_normals(mesh);
-    for (std::size_t i = 0; i < given.size(); ++i)
-      if (given[i] != vec3(0)) mesh.normals[i] = given[i];
+    zero_normals_ += mend_normals(mesh) - missing;
     without_normal_ += missing;
-    zero_normals_ += zero;
   }
 
   Vec4<double> value(const Accessor& accessor, std::size_t i) const {

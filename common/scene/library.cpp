@@ -545,7 +545,7 @@ Scene load_scene(const std::string& name_or_file, const LoadOptions& options) {
       colon == std::string::npos ? "" : std::string_view(name_or_file).substr(colon + 1);
   for (const MadeScene& made : made_scenes())
     if (name == made.name) {
-      Scene scene = made.make(Parameters(name, made.parameters, parameters));
+      Scene scene = made.make(Parameters(name, made.parameters, parameters, options));
       scene.name = name_or_file;
       return scene;
     }

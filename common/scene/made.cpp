@@ -26,8 +26,8 @@ std::string listed(const std::vector<std::string>& words) {
 }  // namespace
 
 Parameters::Parameters(const std::string& scene, const std::vector<Parameter>& declared,
-                       std::string_view text)
-    : values_(declared) {
+                       std::string_view text, const LoadOptions& options)
+    : values_(declared), textures_(options.textures) {
   std::set<std::string_view> seen;
   while (!text.empty()) {
     const std::string_view word = text.substr(0, text.find(','));

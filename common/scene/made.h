@@ -24,13 +24,17 @@ class Parameters {
   /// Reads "name=value,name=value"; what is not named keeps its value. Throws InputError for a name that is
   /// not there (naming those that are), a name given twice, what is no number and no word for one, or out of
   /// range.
-  Parameters(const std::string& scene, const std::vector<Parameter>& declared, std::string_view text);
+  Parameters(const std::string& scene, const std::vector<Parameter>& declared, std::string_view text,
+             const LoadOptions& options = {});
 
   double operator[](std::string_view name) const;
   int whole(std::string_view name) const;
+  /// LoadOptions::textures: may textures be left out?
+  bool textures() const { return textures_; }
 
  private:
   std::vector<Parameter> values_;
+  bool textures_;
 };
 
 struct MadeScene {

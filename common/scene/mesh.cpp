@@ -1,6 +1,8 @@
 #include "common/scene/mesh.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace trilha {
 
@@ -32,6 +34,21 @@ void make_normals(Mesh& mesh) {
     const double length = glm::length(sums[i]);
     mesh.normals[i] = length > 0 ? vec3(sums[i] / length) : vec3(0, 0, 1);
   }
+}
+
+vec3 unit_or_zero(const dvec3& normal) {
+  const double length = glm::length(normal);
+  return length > 0 ? vec3(normal / length) : vec3(0);
+}
+
+std::size_t mend_normals(Mesh& mesh) {
+  const auto zero = std::count(mesh.normals.begin(), mesh.normals.end(), vec3(0));
+  if (zero == 0) return 0;
+  const std::vector<vec3> given = std::move(mesh.normals);
+  make_normals(mesh);
+  for (std::size_t i = 0; i < given.size(); ++i)
+    if (given[i] != vec3(0)) mesh.normals[i] = given[i];
+  return static_cast<std::size_t>(zero);
 }
 
 }  // namespace trilha

@@ -21,10 +21,6 @@
 namespace trilha {
 namespace {
 
-constexpr std::size_t most_vertices = 2147483647;
-constexpr std::size_t most_triangles = 4294967294;
-constexpr std::size_t most_corners = 10000;  // splitting takes time with their square
-
 enum Kind { position, texture_coordinate, normal };  // in the order that a face's corner names them
 
 struct KindName {
@@ -610,32 +606,17 @@ class Build {
   }
 
   void fill_normals(Mesh& mesh, const std::vector<Corner>& vertices) {
-    std::vector<vec3> given(vertices.size(), vec3(0));
-    std::size_t missing = 0, zero = 0;
+    std::size_t missing = 0;
+    mesh.normals.assign(vertices.size(), vec3(0));
     for (std::size_t i = 0; i < vertices.size(); ++i) {
       const std::int32_t index = vertices[i].index[normal];
-      if (index < 0) {
+      if (index < 0)
         ++missing;
-        continue;
-      }
-      const dvec3 normal = read_.normals[static_cast<std::size_t>(index)];
-      const double length = glm::length(normal);
-      if (length > 0) {
-        given[i] = vec3(normal / length);
-      } else {
-        ++zero;
-      }
+      else
+        mesh.normals[i] = unit_or_zero(read_.normals[static_cast<std::size_t>(index)]);
     }
-    if (missing + zero == 0) {
-      mesh.normals = std::move(given);
-      return;
-    }
-    make_normals(mesh);
-    for (std::size_t i = 0; i < given.size(); ++i) {
-      if (given[i] != vec3(0)) mesh.normals[i] = given[i];
-    }
+    zero_normals_ += mend_normals(mesh) - missing;
     without_normal_ += missing;
-    zero_normals_ += zero;
   }
 
   void warn(const std::string& path, std::vector<std::string>& warnings) const {

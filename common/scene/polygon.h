@@ -1,10 +1,14 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "common/math/vector.h"
 
 namespace trilha {
+
+/// The corners that a polygon has at most: splitting it takes time with their square.
+constexpr std::size_t most_corners = 10000;
 
 /// Splits a polygon of n ≥ 3 corners, which should lie in a plane and may be concave, into n − 2 triangles of
 /// corner numbers that turn as it does. Four corners take the shorter diagonal that lies inside; more are

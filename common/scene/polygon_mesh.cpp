@@ -1,17 +1,10 @@
 #include "common/scene/polygon_mesh.h"
 
-#include <algorithm>
 #include <filesystem>
 
-#include "common/scene/polygon.h"
 #include "common/scene/text.h"
 
 namespace trilha {
-
-vec3 unit_or_zero(const dvec3& normal) {
-  const double length = glm::length(normal);
-  return length > 0 ? vec3(normal / length) : vec3(0);
-}
 
 std::string scene_name(const std::string& path) {
   std::filesystem::path name = std::filesystem::path(path).filename();
@@ -78,18 +71,6 @@ void PolygonMesh::add_of_strip(const uvec3& t) {
   }
 }
 
-void PolygonMesh::mend_normals() {
-  const auto zero = std::count(mesh.normals.begin(), mesh.normals.end(), vec3(0));
-  if (zero == 0) return;
-  const std::vector<vec3> given = std::move(mesh.normals);
-  make_normals(mesh);
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i] != vec3(0)) mesh.normals[i] = given[i];
-  }
-  warnings.push_back(path_ + ": " + counted(static_cast<std::uint64_t>(zero), "vertex normal") +
-                     " of zero length made from the faces");
-}
-
 Scene PolygonMesh::scene() {
   Scene scene;
   scene.name = scene_name(path_);
@@ -103,7 +84,7 @@ Scene PolygonMesh::scene() {
   if (mesh.triangles.empty()) {
     warnings.push_back(path_ + ": no faces in it: the scene is empty");
   } else {
-    mend_normals();
+    warn(mend_normals(mesh), "vertex normal", " of zero length made from the faces");
     mesh.name = scene.name;
     scene.meshes.push_back(std::move(mesh));
   }

@@ -6,13 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "common/scene/polygon.h"
 #include "common/scene/scene.h"
 
 namespace trilha {
-
-constexpr std::size_t most_vertices = 2147483647;
-constexpr std::size_t most_triangles = 4294967294;
-constexpr std::size_t most_corners = 10000;  ///< of a polygon: splitting takes time with their square
 
 /// Makes room for one more, of `expected` in all: little where little has come so far, since what a file
 /// promises costs nothing to write. At most 9/8 of the vector's memory is ever in use: what is reserved and
@@ -56,7 +53,6 @@ class PolygonMesh {
 
   void push(const uvec3& triangle, std::uint64_t expected);
   void split(const Unsplit& polygon);
-  void mend_normals();
 
   std::string path_;
   bool vertices_known_ = false;
@@ -66,9 +62,6 @@ class PolygonMesh {
   std::vector<uvec3> split_;
   std::uint64_t without_area_ = 0, too_few_corners_ = 0, crossed_ = 0, stitches_ = 0;
 };
-
-/// The normal, of length one; (0, 0, 0) where it has no length.
-vec3 unit_or_zero(const dvec3& normal);
 
 /// The name of the scene in that file: without ".gz", and without the ending before it.
 std::string scene_name(const std::string& path);

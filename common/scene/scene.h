@@ -135,6 +135,7 @@ struct Scene {
   Camera camera;
   std::vector<View> views;  ///< other places to look from
   SceneFeatures features;
+  std::size_t images_not_read = 0;    ///< images that it names and LoadOptions did not want
   std::vector<std::string> warnings;  ///< one line each, for the user
 
   std::size_t triangle_count() const;  ///< with instances: as many as a ray may hit

@@ -943,7 +943,7 @@ const Node* Loader::made(const std::string& text, const std::string& path, std::
   Scene from;
   try {
     const std::string rest = text.size() > name.size() ? text.substr(name.size() + 1) : "";
-    from = found->second->make(Parameters(name, found->second->parameters, rest));
+    from = found->second->make(Parameters(name, found->second->parameters, rest, options_));
   } catch (const InputError& error) {
     refuse(path, line, error.what());
   }
@@ -964,6 +964,7 @@ const Node* Loader::model(Scene from, const std::string& path) {
   const auto first_material = static_cast<std::uint32_t>(scene.materials.size());
   const auto first_texture = static_cast<std::int32_t>(scene.textures.size());
   for (Texture& texture : from.textures) scene.textures.push_back(std::move(texture));
+  scene.images_not_read += from.images_not_read;
   std::uint64_t texels = 0;
   for (const Texture& texture : scene.textures)
     if (!texture.levels.empty())
@@ -1167,7 +1168,11 @@ void Loader::settle_instances() {
 
 void Loader::read_surroundings(const Surroundings& from) {
   scene.environment = from.environment;
-  if (from.file.empty() || !options_.environment) return;
+  if (from.file.empty()) return;
+  if (!options_.environment) {
+    ++scene.images_not_read;
+    return;
+  }
   Image image = read_image(from.file);
   if (image.encoding != Encoding::light)
     refuse(from.path, from.line,

@@ -378,9 +378,14 @@ std::int32_t TextureSet::number(const std::string& image, const std::string& lab
   return result;
 }
 
+std::int32_t TextureSet::left_out(const std::string& image) {
+  scene_.images_not_read += left_out_.insert(image).second;
+  return -1;
+}
+
 std::int32_t TextureSet::add(const fs::path& file, const How& how, const std::string& path,
                              std::size_t line) {
-  if (!options_.textures) return -1;
+  if (!options_.textures) return left_out(file.string());
   const std::string label = printable(file.string()) + ":";
   std::error_code error;
   fs::path whole = fs::weakly_canonical(file, error);
@@ -406,7 +411,7 @@ std::int32_t TextureSet::add(const fs::path& file, const How& how, const std::st
 
 std::int32_t TextureSet::add(const std::string& name, std::string_view encoded, const How& how,
                              const std::string& path, std::size_t line) {
-  if (!options_.textures) return -1;
+  if (!options_.textures) return left_out(name);
   const std::string label =
       printable(path) + (line == 0 ? "" : ":" + std::to_string(line)) + ": image " + in_quotes(name);
   return number(path + '\0' + '#' + name, label, how, [&] {

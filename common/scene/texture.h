@@ -70,9 +70,10 @@ class TextureSet {
   };
 
   /// The number in Scene::textures of the image in that file, which line `line` of the file `path` names (0:
-  /// no line applies); −1 where textures are not wanted. A file that does not exist becomes the magenta
-  /// texture, with one warning. Throws InputError, "FILE: cannot be read: …", where decode() does, where the
-  /// file is a folder, no regular file or may not be read, or holds numbers that are not finite.
+  /// no line applies); −1 where textures are not wanted (Scene::images_not_read counts them). A file that
+  /// does not exist becomes the magenta texture, with one warning. Throws InputError, "FILE: cannot be read:
+  /// …", where decode() does, where the file is a folder, no regular file or may not be read, or holds
+  /// numbers that are not finite.
   ///
   /// Limits, asked of the header: sides of 16384, 2²⁶ texels; a file of n bytes has at most 2²⁰ + 1024·n
   /// texels of bytes, or a quarter as many of floats: what deflate can make of n bytes, so that a PNG of one
@@ -88,13 +89,15 @@ class TextureSet {
  private:
   std::int32_t number(const std::string& image, const std::string& label, const How& how,
                       const std::function<Texture()>& make);
+  std::int32_t left_out(const std::string& image);
   long long texels_so_far();  // of the scene, in the largest levels
 
   Scene& scene_;
   const LoadOptions& options_;
   std::map<std::string, std::int32_t> numbers_;  // by image, use and wraps
-  std::set<std::string> missing_;                // images that a warning was given for
-  std::size_t counted_ = 0;                      // textures of the scene in texels_
+  std::set<std::string> left_out_;
+  std::set<std::string> missing_;  // images that a warning was given for
+  std::size_t counted_ = 0;        // textures of the scene in texels_
   long long texels_ = 0;
 };
 

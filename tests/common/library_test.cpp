@@ -12,27 +12,20 @@
 #include <thread>
 
 #include "common/error.h"
+#include "tests/common/scene_checks.h"
 #include "tests/program.h"
 #include "tests/testing.h"
 
 using namespace trilha;
 using trilha::testing::contents;
 using trilha::testing::Folder;
+using trilha::testing::refusal;
 using trilha::testing::Result;
 using trilha::testing::write;
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 namespace {
-
-std::optional<std::string> refusal(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return std::nullopt;
-}
 
 std::string printed(const std::string& name = "") {
   std::ostringstream out;

@@ -24,42 +24,20 @@
 #include "common/math/random.h"
 #include "common/scene/library.h"
 #include "common/scene/text.h"
+#include "tests/common/scene_checks.h"
 #include "tests/program.h"
 #include "tests/testing.h"
 
 using namespace trilha;
+using trilha::testing::check_refusal;
 using trilha::testing::Folder;
+using trilha::testing::refusal;
+using trilha::testing::warns_of;
 using trilha::testing::write;
 
 namespace {
 
 const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-
-template <class Call>
-std::optional<std::string> refusal(const Call& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return std::nullopt;
-}
-
-void check_refusal(const std::optional<std::string>& message, const std::string& path, int line,
-                   const std::string& fragment) {
-  REQUIRE(message);
-  INFO(*message);
-  CHECK(message->rfind(path + (line == 0 ? ": " : ":" + std::to_string(line) + ": "), 0) == 0);
-  CHECK(message->find(fragment) != std::string::npos);
-  CHECK(message->find(';') != std::string::npos);  // what would be right
-  CHECK(message->find('\n') == std::string::npos);
-}
-
-bool warns_of(const Scene& scene, const std::string& fragment) {
-  return std::any_of(scene.warnings.begin(), scene.warnings.end(), [&](const std::string& warning) {
-    return warning.find(fragment) != std::string::npos && warning.find('\n') == std::string::npos;
-  });
-}
 
 Scene loaded(const Folder& folder, const std::string& obj, const std::string& mtl = "") {
   if (!mtl.empty()) write(folder / "test.mtl", mtl);

@@ -1,12 +1,6 @@
 // The scenes that every chapter stands on: what is read is what the file says, what cannot be read is refused
 // with its line, and what is made has the shape that its formula promises.
 
-#if __has_include(<catch2/catch_all.hpp>)
-#include <catch2/catch_all.hpp>
-#else
-#include <catch2/catch.hpp>
-#endif
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -31,8 +25,13 @@
 #include "common/scene/polygon.h"
 #include "common/scene/scene.h"
 #include "common/scene/text.h"
+#include "tests/common/scene_checks.h"
 
 using namespace trilha;
+using trilha::testing::check_refusal;
+using trilha::testing::refusal;
+using trilha::testing::sound;
+using trilha::testing::warns_of;
 namespace fs = std::filesystem;
 using namespace std::string_literals;
 
@@ -66,47 +65,7 @@ Scene loaded(const std::string& text) {
   return load_obj(folder.write("test.obj", text));
 }
 
-/// The message with which the call refuses its input; none where it takes it.
-template <class Call>
-std::optional<std::string> refusal(const Call& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return std::nullopt;
-}
-
-void check_refusal(const std::optional<std::string>& message, const std::string& path, int line,
-                   const std::string& fragment) {
-  REQUIRE(message);
-  INFO(*message);
-  CHECK(message->rfind(path + (line == 0 ? ": " : ":" + std::to_string(line) + ": "), 0) == 0);
-  CHECK(message->find(fragment) != std::string::npos);
-  CHECK(message->find(';') != std::string::npos);  // what would be right
-  CHECK(message->find('\n') == std::string::npos);
-}
-
-bool warns_of(const Scene& scene, const std::string& fragment) {
-  return std::any_of(scene.warnings.begin(), scene.warnings.end(), [&](const std::string& warning) {
-    return warning.find(fragment) != std::string::npos && warning.find('\n') == std::string::npos;
-  });
-}
-
 bool finite(const vec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
-
-/// What every mesh promises, wherever it comes from.
-bool sound(const Mesh& mesh) {
-  const std::size_t n = mesh.positions.size();
-  const auto is_unit = [](const vec3& v) { return std::abs(glm::length(dvec3(v)) - 1) < 1e-6; };
-  return std::all_of(mesh.positions.begin(), mesh.positions.end(), finite) &&
-         std::all_of(mesh.triangles.begin(), mesh.triangles.end(),
-                     [n](const uvec3& t) { return t.x < n && t.y < n && t.z < n; }) &&
-         (mesh.normals.empty() || mesh.normals.size() == n) &&
-         std::all_of(mesh.normals.begin(), mesh.normals.end(), is_unit) &&
-         (mesh.texture_coordinates.empty() || mesh.texture_coordinates.size() == n) &&
-         (mesh.materials.empty() || mesh.materials.size() == mesh.triangles.size());
-}
 
 /// Twice the triangle's area, as a vector.
 dvec3 area_vector(const Mesh& mesh, const uvec3& t) {

@@ -47,6 +47,7 @@ class Hall {
         bays_(p.whole("bays")),
         half_(bay * bays_ / 2),
         texels_(p.whole("textures")),
+        textures_(p.textures()),
         root_(turned(0, p["tilt"]) * turned(1, p["angle"])) {}
 
   Scene make() {
@@ -117,6 +118,7 @@ class Hall {
   int bays_;
   double half_;  // of the length, between the axes of the outermost columns
   int texels_;
+  bool textures_;
   glm::dmat3 root_;
   Scene scene_;
   std::vector<dvec3> lamps_;
@@ -130,8 +132,9 @@ void Hall::make_materials() {
     Material& material = scene_.materials[std::size_t(i)];
     material.name = about.name;
     material.roughness = 0.9f;
-    if (texels_ == 0) {
+    if (texels_ == 0 || !textures_) {
       material.diffuse = hall_mean_colour(which);
+      if (texels_ > 0) scene_.images_not_read += about.has_normals ? 2 : 1;
       continue;
     }
     HallTexels texels = hall_texels(which, texels_);
