@@ -36,13 +36,6 @@ constexpr std::int64_t most_elements = 4294967294;          // what 32 bits numb
 constexpr std::int64_t most_bytes = std::int64_t{1} << 53;  // up to there a double is a whole number
 constexpr std::size_t most_per_byte = 4;  // triangles: a strip of bytes has one, and bytes may be shared
 
-/// The name without what would break a line of output.
-std::string plain(std::string name) {
-  for (char& c : name)
-    if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
-  return name;
-}
-
 // The file, and the objects in it.
 
 /// The lists of the file; lights are those of an extension.
@@ -646,8 +639,8 @@ class Materials {
 
   Material read(const Item& item) {
     Material made;
-    made.name = plain(item->text("name", ""));
-    if (made.name.empty()) made.name = plain(item.what);
+    made.name = printable(item->text("name", ""));
+    if (made.name.empty()) made.name = printable(item.what);
 
     const Item pbr = item.part("pbrMetallicRoughness");
     Vec4<double> base(1);
@@ -904,8 +897,8 @@ class Meshes {
  private:
   Mesh read(const Item& item) {
     Mesh mesh;
-    mesh.name = plain(item->text("name", ""));
-    if (mesh.name.empty()) mesh.name = plain(item.what);
+    mesh.name = printable(item->text("name", ""));
+    if (mesh.name.empty()) mesh.name = printable(item.what);
     item->need("primitives");
     const std::vector<Json>& primitives = item->list("primitives");
     std::vector<Source> sources;
@@ -1265,8 +1258,8 @@ class Nodes {
     perspective->need("yfov");
     View view;
     for (const Item* named : {&node, &camera})
-      if (view.name.empty()) view.name = plain((*named)->text("name", ""));
-    if (view.name.empty()) view.name = plain(camera.what);
+      if (view.name.empty()) view.name = printable((*named)->text("name", ""));
+    if (view.name.empty()) view.name = printable(camera.what);
     view.camera.field_of_view = static_cast<float>(perspective->number("yfov", 1, 1e-4, 3.14) * 180 / pi);
     view.camera.eye = rounded(node, here[3]);
     // A target as far away as the origin: nearer, its rounding would turn the camera.
@@ -1282,8 +1275,8 @@ class Nodes {
         file_.item(List::lights, file_.index(node.extension("KHR_lights_punctual"), "light", List::lights));
     Light light;
     for (const Item* named : {&node, &from})
-      if (light.name.empty()) light.name = plain((*named)->text("name", ""));
-    if (light.name.empty()) light.name = plain(from.what);
+      if (light.name.empty()) light.name = printable((*named)->text("name", ""));
+    if (light.name.empty()) light.name = printable(from.what);
     from->need("type");
     const std::string type = from->text("type", "");
     if (type == "point") {

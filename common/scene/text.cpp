@@ -23,15 +23,19 @@ bool is_binary(char c) {
   return (byte < 9) | ((byte > 13) & (byte < 32));
 }
 
+}  // namespace
+
 std::string printable(std::string_view text) {
-  std::string result(text);
-  for (char& c : result) {
-    if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const auto next = static_cast<unsigned char>(i + 1 < text.size() ? text[i + 1] : ' ');
+    const bool eight_bits = byte == 0xc2 && next >= 0x80 && next < 0xa0;  // U+0080 to U+009F in UTF-8
+    result += byte < 32 || byte == 127 || eight_bits ? '?' : text[i];
+    i += eight_bits;
   }
   return result;
 }
-
-}  // namespace
 
 void refuse(const std::string& path, std::size_t line, const std::string& what) {
   throw InputError(printable(path) + (line == 0 ? "" : ":" + std::to_string(line)) + ": " + what);

@@ -16,6 +16,10 @@ namespace trilha {
 /// "1 face", "3 faces".
 std::string counted(std::uint64_t n, const std::string& what);
 
+/// The text without what could break a line of output or steer a terminal: control characters, those of ISO
+/// 8859 among them, become question marks.
+std::string printable(std::string_view text);
+
 /// The text in quotes, cut to 40 bytes, without what could break a line of output.
 std::string in_quotes(std::string_view text);
 

@@ -309,13 +309,6 @@ Texture missing_texture(TextureUse use) {
   return texture;
 }
 
-/// The path as a line of output may hold it.
-std::string printable(std::string path) {
-  for (char& c : path)
-    if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
-  return path;
-}
-
 }  // namespace
 
 std::size_t Texture::bytes() const {
