@@ -364,14 +364,15 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
     check_output();
     return 0;
   }
-  catch_interrupts();
   set_thread_count(options.threads);
   if (options.stability) {
+    catch_interrupts();
     run_stability(demo, options);
     check_output();
     return 0;
   }
   if (!options.report.empty() || !options.sweeps.empty()) {
+    catch_interrupts();
     run_report(demo, settings, options, make_demo);
     check_output();
     return 0;
@@ -386,6 +387,7 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
 
   Outcome outcome = build(demo, scene, stream);
   outcome.load_ms = load_ms;
+  catch_interrupts();  // until here there is nothing to keep, and Ctrl-C ends the program as it ends any other
   std::vector<Saving> savings;
   if (const std::size_t images = scene.images_not_read; images > 0)
     savings.push_back(

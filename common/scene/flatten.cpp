@@ -11,6 +11,8 @@ namespace {
 
 constexpr std::size_t most = most_triangles;  // and vertices
 
+constexpr std::size_t most_multiplied = std::size_t{1} << 24;  // a small file names many instances easily
+
 /// Refuses what 32-bit numbers cannot name or memory cannot hold.
 void check_size(const Scene& scene, const MeshParts& parts) {
   const std::size_t vertices = scene.vertex_count(), triangles = scene.triangle_count();
@@ -18,6 +20,12 @@ void check_size(const Scene& scene, const MeshParts& parts) {
     throw InputError(scene.name + ": " + std::to_string(triangles) + " triangles with " +
                      std::to_string(vertices) +
                      " vertices; a structure without instances takes up to 4294967294 of each");
+  std::size_t stored = 0;
+  for (const Mesh& mesh : scene.meshes) stored += mesh.triangles.size();
+  if (triangles > stored + most_multiplied)
+    throw InputError(scene.name + ": its instances make " + std::to_string(triangles) + " of " +
+                     std::to_string(stored) + " triangles; a structure without instances takes up to " +
+                     std::to_string(most_multiplied) + " more than there are");
   const double vertex = sizeof(vec3) * (parts.normals ? 2 : 1) + sizeof(vec2) * parts.texture_coordinates;
   const double triangle = sizeof(uvec3) + sizeof(std::uint32_t) * parts.materials;
   const double needed = vertex * double(vertices) + triangle * double(triangles);

@@ -13,8 +13,9 @@ struct MeshParts {
 
 /// All meshes of the scene as one, each instance's transform applied to its vertices; a mirrored instance's
 /// triangles change their order, so that fronts stay fronts. Positions are computed in double and rounded
-/// once. Throws InputError where there are more than 2³² − 2 triangles or vertices, the result would not fit
-/// into this machine's memory (both said before anything is allocated), or a position is no finite float.
+/// once. Throws InputError where there are more than 2³² − 2 triangles or vertices, instances make more than
+/// 2²⁴ triangles beyond those that are stored, the result would not fit into this machine's memory (all said
+/// before anything is allocated), or a position is no finite float.
 Mesh flattened(const Scene& scene, const MeshParts& parts);
 
 }  // namespace trilha

@@ -60,15 +60,21 @@ Camera framing(const Box& box, const vec3& up) {
 
 namespace {
 
-/// What a ray from some point meets first.
+/// What a ray from some point meets first, and how many surfaces in all.
 struct Seen {
   double distance = INFINITY;
   bool front = false;
+  int surfaces = 0;
 };
 
-/// The first surface in each of the unit directions. A triangle a, b, c is met where d·(a×b), d·(b×c) and
-/// d·(c×a) have one sign, seen from the point: below 0, its front. Few are; so the signs are all that is
-/// computed of most, for all directions at once.
+// Triangles that a camera is worth: some milliseconds.
+constexpr std::size_t most_looked_at = std::size_t{1} << 20;
+
+constexpr std::size_t most_directions = 65;
+
+/// The first surface in each of the unit directions, of which there are at most most_directions. A triangle
+/// a, b, c is met where d·(a×b), d·(b×c) and d·(c×a) have one sign, seen from the point: below 0, its front.
+/// Few are; so the signs are all that is computed of most, for all directions at once.
 std::vector<Seen> seen_from(const Scene& scene, const dvec3& point, const std::vector<dvec3>& directions) {
   const std::size_t count = directions.size();
   std::vector<double> x, y, z;
@@ -79,9 +85,14 @@ std::vector<Seen> seen_from(const Scene& scene, const dvec3& point, const std::v
   }
   std::vector<Seen> all(count);
   const auto take_nearer = [](std::vector<Seen>& to, const std::vector<Seen>& from) {
-    for (std::size_t i = 0; i < to.size(); ++i)
+    for (std::size_t i = 0; i < to.size(); ++i) {
+      const int surfaces = to[i].surfaces + from[i].surfaces;
       if (from[i].distance < to[i].distance) to[i] = from[i];
+      to[i].surfaces = surfaces;
+    }
   };
+  const std::size_t step = 1 + scene.triangle_count() / most_looked_at;
+  std::size_t first = 0;  // of the next mesh's triangles that is looked at
   for_each_placed(scene, [&](const Mesh& mesh, const Instance* instance) {
     const bool mirrored = instance != nullptr && mirrors(instance->transform);
     const auto corner = [&](std::uint32_t i) {
@@ -89,9 +100,9 @@ std::vector<Seen> seen_from(const Scene& scene, const dvec3& point, const std::v
       return (instance == nullptr ? p : apply(instance->transform, p)) - point;
     };
     const auto of_some = [&](const tbb::blocked_range<std::size_t>& range, std::vector<Seen> seen) {
-      std::vector<double> same_sign(count);
+      double same_sign[most_directions];
       for (std::size_t i = range.begin(); i != range.end(); ++i) {
-        const uvec3& t = mesh.triangles[i];
+        const uvec3& t = mesh.triangles[first + i * step];
         const dvec3 a = corner(t.x), b = corner(t.y), c = corner(t.z);
         const dvec3 ab = glm::cross(a, b), bc = glm::cross(b, c), ca = glm::cross(c, a);
         double met = 0;
@@ -107,21 +118,41 @@ std::vector<Seen> seen_from(const Scene& scene, const dvec3& point, const std::v
         for (std::size_t k = 0; k < count; ++k) {
           if (same_sign[k] == 0) continue;
           const double distance = glm::dot(a, normal) / glm::dot(directions[k], normal);
-          if (distance >= 0 && distance < seen[k].distance)
-            seen[k] = {distance, (same_sign[k] < 0) != mirrored};
+          if (!(distance >= 0)) continue;
+          ++seen[k].surfaces;
+          if (distance < seen[k].distance) {
+            seen[k].distance = distance;
+            seen[k].front = (same_sign[k] < 0) != mirrored;
+          }
         }
       }
       return seen;
     };
-    take_nearer(all,
-                tbb::parallel_deterministic_reduce(
-                    tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), std::vector<Seen>(count),
-                    of_some, [&](std::vector<Seen> one, const std::vector<Seen>& other) {
-                      take_nearer(one, other);
-                      return one;
-                    }));
+    const std::size_t size = mesh.triangles.size();
+    const std::size_t looked_at = first < size ? (size - first + step - 1) / step : 0;
+    const tbb::blocked_range<std::size_t> range(0, looked_at, 4096);
+    if (looked_at <= range.grainsize())  // of many instances, each has few
+      all = of_some(range, std::move(all));
+    else
+      take_nearer(
+          all, tbb::parallel_deterministic_reduce(range, std::vector<Seen>(count), of_some,
+                                                  [&](std::vector<Seen> one, const std::vector<Seen>& other) {
+                                                    take_nearer(one, other);
+                                                    return one;
+                                                  }));
+    first = first + looked_at * step - size;
   });
   return all;
+}
+
+/// Are most of the surfaces around the two sides of a wall and nothing else? A cup is that, or a cupboard.
+bool within_a_shell(const std::vector<Seen>& around) {
+  std::ptrdiff_t met = 0, walls = 0;
+  for (const Seen& seen : around) {
+    met += seen.surfaces > 0;
+    walls += seen.surfaces == 2 && seen.front;
+  }
+  return 2 * walls >= met;
 }
 
 /// Is the first surface a front in `tenths` of the directions, and hardly ever a back, as within a body? Of a
@@ -161,7 +192,8 @@ Camera framing(const Scene& scene, const vec3& up) {
   const auto room_at = [&](double off_centre, int tenths) {
     dvec3 point = centre;
     point[along] += off_centre * size[along];
-    return surrounded(seen_from(scene, point, around(16)), tenths);
+    const std::vector<Seen> seen = seen_from(scene, point, around(32));
+    return surrounded(seen, tenths) && !within_a_shell(seen);
   };
   if (!room_at(0, 7) && !(room_at(0.25, 9) && room_at(-0.25, 9))) return outside;
 

@@ -155,7 +155,8 @@ Camera framing(const Box& box, const vec3& up);
 /// A camera for the scene: inside it, looking along its longest way across `up` from where the view is free,
 /// where it is a room; else framing() of its bounds. A room is where front faces are what is seen from the
 /// middle in seven of ten directions, or, where something stands in the middle, from halfway to both ends in
-/// nine of ten.
+/// nine of ten; but for a shell, like a cup, behind whose two sides there is nothing more. Of scenes with more
+/// than 2²⁰ triangles, some are looked at, evenly.
 Camera framing(const Scene& scene, const vec3& up);
 
 /// The camera for an image of that aspect (width over height): where that is higher than wide, the field of
