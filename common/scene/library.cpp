@@ -93,7 +93,8 @@ struct Asset {
 
 /// The name without what says what kind of model it is; empty where it is no scene.
 std::string stem(const std::string& name) {
-  for (const std::string_view ending : {".obj", ".ply", ".ply.gz", ".off", ".gltf", ".glb", ".json", ".exr"})
+  for (const std::string_view ending :
+       {".obj", ".ply", ".ply.gz", ".off", ".off.gz", ".gltf", ".glb", ".json", ".exr"})
     if (name.size() > ending.size() && name.ends_with(ending))
       return name.substr(0, name.size() - ending.size());
   return "";
@@ -275,7 +276,7 @@ std::size_t edits(const std::string& a, const std::string& b) {
     if (entry.collection.empty()) names += (names.empty() ? "" : ", ") + entry.name;
   for (const SceneCollection& collection : scene_collections()) names += ", " + collection.name + "/…";
   throw InputError(text + "scenes are " + names +
-                   "; files end in .obj, .ply, .ply.gz, .off, .gltf, .glb or .json");
+                   "; files end in .obj, .ply, .ply.gz, .off, .off.gz, .gltf, .glb or .json");
 }
 
 /// The entries that a list is asked for: all, a collection's, or one.
@@ -320,6 +321,26 @@ std::string shown(double number) {
   text.precision(15);  // 10000000, not 1e+07
   text << number;
   return text.str();
+}
+
+/// The parameter as it is unless said: hall:detail=4, cornell_box:light=panel.
+std::string unless_said(const SceneEntry& entry, const Parameter& p) {
+  const std::string value = p.words.empty() ? shown(p.value) : p.words[std::size_t(p.value - p.low)];
+  return entry.name + ":" + p.name + "=" + value;
+}
+
+/// What it may be: a range, or one of some words.
+std::string choices(const Parameter& p) {
+  if (p.words.empty())
+    return shown(p.low) + " to " + shown(p.high) + (p.whole ? "" : ", not only whole numbers");
+  std::string text = p.words[0];
+  for (std::size_t i = 1; i < p.words.size(); ++i)
+    text += (i + 1 == p.words.size() ? " or " : ", ") + p.words[i];
+  return text;
+}
+
+std::string triangles_or(const SceneEntry& entry, const char* otherwise) {
+  return entry.triangles ? grouped(*entry.triangles) : otherwise;
 }
 
 /// The words in lines of so many characters; a word that is longer has a line of its own.
@@ -370,20 +391,15 @@ void print_table(std::ostream& out, const std::vector<SceneEntry>& entries, bool
     for (std::string& line : wrapped(joined(entry.features), width - before))
       lines.push_back(std::move(line));
     print_column(out,
-                 head(entry.name, entry.triangles ? grouped(*entry.triangles) : "?",
-                      entry.available ? "yes" : "no", entry.licence),
+                 head(entry.name, triangles_or(entry, "?"), entry.available ? "yes" : "no", entry.licence),
                  before, lines);
   }
 }
 
 void print_parameters(std::ostream& out, const SceneEntry& entry, std::size_t names) {
-  for (const Parameter& p : entry.parameters) {
-    const std::string head = left(entry.name + ":" + p.name + "=" + shown(p.value), names + 2);
-    print_column(out, head, names + 2,
-                 wrapped(std::string(p.help) + "; " + shown(p.low) + " to " + shown(p.high) +
-                             (p.whole ? "" : ", not only whole numbers"),
-                         width - names - 2));
-  }
+  for (const Parameter& p : entry.parameters)
+    print_column(out, left(unless_said(entry, p), names + 2), names + 2,
+                 wrapped(std::string(p.help) + "; " + choices(p), width - names - 2));
 }
 
 void print_one(std::ostream& out, const SceneEntry& entry) {
@@ -391,7 +407,7 @@ void print_one(std::ostream& out, const SceneEntry& entry) {
     print_column(out, left(what, 12), 12, wrapped(text, width - 12));
   };
   line("scene", entry.name + ": " + entry.what);
-  line("triangles", entry.triangles ? grouped(*entry.triangles) : "not known before it is loaded");
+  line("triangles", triangles_or(entry, "not known before it is loaded"));
   if (entry.triangles) line("features", entry.features.empty() ? "none" : joined(entry.features));
   line("licence", entry.licence);
   line("here", entry.available ? "yes" : "no: ./trilha assets " + entry.asset + " fetches it");
@@ -399,8 +415,7 @@ void print_one(std::ostream& out, const SceneEntry& entry) {
   if (entry.parameters.empty()) return;
   out << "\n";
   std::size_t names = 0;
-  for (const Parameter& p : entry.parameters)
-    names = std::max(names, characters(entry.name + ":" + p.name + "=" + shown(p.value)));
+  for (const Parameter& p : entry.parameters) names = std::max(names, characters(unless_said(entry, p)));
   print_parameters(out, entry, names);
 }
 
@@ -494,8 +509,7 @@ void print_scenes(std::ostream& out, const std::string& name) {
 
   names = 0;
   for (const SceneEntry& entry : entries)
-    for (const Parameter& p : entry.parameters)
-      names = std::max(names, characters(entry.name + ":" + p.name + "=" + shown(p.value)));
+    for (const Parameter& p : entry.parameters) names = std::max(names, characters(unless_said(entry, p)));
   if (names > 0) out << "\nparameters, as they are unless said; several: NAME:a=1,b=2\n";
   for (const SceneEntry& entry : entries) print_parameters(out, entry, names);
   out << "\nto fetch what is not here: ./trilha assets\n";
@@ -512,7 +526,8 @@ std::string scenes_as_json(const std::string& name) {
                             {"value", p.value},
                             {"low", p.low},
                             {"high", p.high},
-                            {"whole", p.whole}});
+                            {"whole", p.whole},
+                            {"words", p.words}});
     const auto or_null = [](const std::string& text) { return text.empty() ? Json() : Json(text); };
     scenes.push_back({{"name", entry.name},
                       {"kind", name_of(entry.kind)},
