@@ -7,6 +7,7 @@
 #include "common/math/random.h"
 #include "common/scene/block_reader.h"
 #include "common/scene/polygon.h"
+#include "common/scene/text.h"
 #include "tests/common/mesh_files.h"
 
 using namespace trilha;
@@ -229,4 +230,30 @@ TEST_CASE("OFF: a damaged file is refused, or read as a sound mesh; blocks may e
            same_bits(scene.meshes[0].texture_coordinates, expected.meshes[0].texture_coordinates);
   }
   CHECK(all);
+}
+
+// Catches: lines that are counted otherwise for a byte that no text has than for what is wrong in a
+// statement; \r\n counted twice where a block ends between them.
+TEST_CASE("text: a byte that is in no text is found in its line, however lines end") {
+  const Folder folder;
+  const std::string path = folder / "text";
+  for (const std::string end : {"\n", "\r", "\r\n"}) {
+    std::string text = end + "a" + end + end + "bc" + end;
+    for (const char* last : {"", "d "}) {
+      write_anew(path, text + last + "\1" + end + end);
+      check_refusal(refusal([&] { read_text(path); }), path, 5, "byte 1 is in no text");
+      for (std::size_t room = 1; room <= text.size() + 4; ++room) {
+        TextFile file(path);
+        char block[40];
+        check_refusal(refusal([&] {
+                        while (file.read(block, room) > 0) {
+                        }
+                      }),
+                      path, 5, "byte 1 is in no text");
+      }
+    }
+    write_anew(path, text + "\n\r\n\r\r\1");  // mixed: as it stands, the first \n may belong to a \r
+    const int line = end == "\r" ? 8 : 9;
+    check_refusal(refusal([&] { read_text(path); }), path, line, "byte 1 is in no text");
+  }
 }
