@@ -8,6 +8,8 @@
 #include <array>
 #include <cfloat>
 #include <cstdint>
+#include <cstdio>
+#include <ctime>
 #include <limits>
 #include <map>
 
@@ -848,4 +850,75 @@ TEST_CASE("PLY: what gzip packed may unpack to 64 MB and 32 times its bytes") {
   write_anew(path, file(n));
   CHECK(load_ply(path).triangle_count() == 1);
   refused(file(n + 200), 0, "unpacks to more than the ");
+}
+
+namespace {
+
+/// A height field of n × n vertices and two triangles for each square, as such files are written.
+std::string height_field(int n, bool ascii) {
+  std::string out = "ply\nformat "s + (ascii ? "ascii" : "binary_little_endian") + " 1.0\nelement vertex " +
+                    std::to_string(n * n) + "\n" + xyz + "element face " +
+                    std::to_string(2 * (n - 1) * (n - 1)) + "\n" + indices + "end_header\n";
+  const auto put_raw = [&](const auto& value) {
+    out.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  char line[100];
+  for (int i = 0; i < n * n; ++i) {
+    const double x = i / n / (n - 1.0), y = i % n / (n - 1.0), z = 0.1 * x * y;
+    if (ascii) {
+      out.append(line,
+                 static_cast<std::size_t>(std::snprintf(line, sizeof line, "%.6f %.6f %.6f\n", x, y, z)));
+    } else {
+      for (const double value : {x, y, z}) put_raw(static_cast<float>(value));
+    }
+  }
+  for (int i = 0; i + 1 < n; ++i) {
+    for (int j = 0; j + 1 < n; ++j) {
+      const int a = i * n + j, b = a + n, c = b + 1, d = a + 1;
+      for (const auto& t : {std::array{a, b, c}, {a, c, d}}) {
+        if (ascii) {
+          out.append(line, static_cast<std::size_t>(
+                               std::snprintf(line, sizeof line, "3 %d %d %d\n", t[0], t[1], t[2])));
+        } else {
+          put_raw(std::uint8_t{3});
+          put_raw(t);
+        }
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+// Catches: a file held whole beside its mesh, a mesh that is copied, vectors that double what they hold.
+TEST_CASE("PLY: a million triangles take at most three times the scene's memory") {
+  constexpr int n = 708;
+  const Folder folder;
+  for (const bool ascii : {false, true}) {
+    write(folder / "field.ply", height_field(n, ascii));
+    peak_memory_since_last_call();
+    const std::size_t before = peak_memory_since_last_call();
+    const Scene scene = load_ply(folder / "field.ply");
+    const std::size_t peak = peak_memory_since_last_call();
+    INFO((ascii ? "ASCII" : "binary")
+         << ": " << before << " before, " << peak << " at most, the scene " << bytes(scene));
+    CHECK(scene.triangle_count() == 2 * (n - 1) * (n - 1));
+    CHECK(bytes(scene) > 17'000'000);
+    if (peak > 0) CHECK(peak < before + 3 * bytes(scene));
+  }
+}
+
+// Catches: a reader that takes many times what the issue allows, a second, also on a busy machine.
+TEST_CASE("PLY: a million triangles take about a second, or less") {
+  require_meaningful_times();
+  const Folder folder;
+  for (const bool ascii : {false, true}) {
+    write(folder / "field.ply", height_field(708, ascii));
+    const std::clock_t begin = std::clock();
+    CHECK(load_ply(folder / "field.ply").triangle_count() == 999698);
+    const double seconds = double(std::clock() - begin) / CLOCKS_PER_SEC;
+    std::printf("PLY, a million triangles, %s: %.2f s\n", ascii ? "ASCII" : "binary", seconds);
+    CHECK(seconds < 4);
+  }
 }
