@@ -98,7 +98,15 @@ std::size_t BlockReader::unpack(char* to, std::size_t n) {
                  "); fetch it again");
     }
   }
-  return n - stream.avail_out;
+  const std::size_t got = n - stream.avail_out;
+  if (got > most_unpacked(size_) - produced_)
+    refuse(path_, 0, "unpacks to more than " + unpack_it_yourself());
+  return got;
+}
+
+std::string BlockReader::unpack_it_yourself() const {
+  return "the " + std::to_string(most_unpacked(size_)) + " bytes allowed for the " + std::to_string(size_) +
+         " that gzip packed; if you trust it, unpack it yourself and name the result";
 }
 
 std::size_t BlockReader::read(char* to, std::size_t n) {
@@ -126,10 +134,22 @@ bool BlockReader::skip(std::uint64_t n) {
   return true;
 }
 
+namespace {
+
+constexpr std::uint64_t most_for_a_byte = 1032;  // 258 bytes for a length and a distance of a bit each
+
+}  // namespace
+
 std::uint64_t BlockReader::most_left() const {
-  constexpr std::uint64_t most_for_a_byte = 1032;  // 258 bytes for a length and a distance of a bit each
-  const std::uint64_t most = unpacker_ ? most_for_a_byte * size_ : size_;
+  const std::uint64_t most =
+      unpacker_ ? std::min(most_for_a_byte * size_, most_unpacked(size_)) : std::uint64_t{size_};
   return most - std::min(most, produced_) + static_cast<std::size_t>(end_ - begin_);
+}
+
+std::string BlockReader::left_for_them(std::uint64_t left) const {
+  if (unpacker_ && most_unpacked(size_) < most_for_a_byte * size_)
+    return std::to_string(left) + " are left of " + unpack_it_yourself();
+  return "the file has " + std::to_string(left) + " left for them";
 }
 
 namespace {

@@ -14,11 +14,15 @@ namespace trilha {
 
 /// The bytes of a file from the first to the last, of which a block is in memory at a time. A file that gzip
 /// packed (RFC 1952: its first two bytes say so, not its name) is unpacked, all its members, and its
-/// checksums are verified.
+/// checksums are verified. It may unpack to most_unpacked() bytes: what gzip makes of scanned and modelled
+/// meshes is an eighth of them or more, of zeros a thousandth, which would fill any memory.
 class BlockReader {
  public:
   /// That many bytes can be held at once.
   static constexpr std::size_t block = 256 * 1024;
+
+  /// What that many bytes of a packed file may unpack to: 64 MB and 32 times as many.
+  static constexpr std::uint64_t most_unpacked(std::uint64_t bytes) { return 64'000'000 + 32 * bytes; }
 
   /// Throws InputError where the file is missing, a folder, no regular file, not readable, or packed by a
   /// program whose files are not read: zip, xz, bzip2, Zstandard.
@@ -34,8 +38,8 @@ class BlockReader {
   const char* end() const { return end_; }
 
   /// Brings at least n ≤ block bytes into memory; false where the file has fewer left, which are in memory
-  /// then. Moves what begin() points to. Throws InputError where the file cannot be read or its packed data
-  /// is damaged.
+  /// then. Moves what begin() points to. Throws InputError where the file cannot be read, or its packed data
+  /// is damaged or unpacks to more than it may.
   bool holds(std::size_t n) { return static_cast<std::size_t>(end_ - begin_) >= n || fill(n); }
 
   /// Goes on to `to`, which lies between begin() and end().
@@ -44,9 +48,13 @@ class BlockReader {
   /// Goes over that many bytes, in memory or not; false where the file has fewer.
   bool skip(std::uint64_t n);
 
-  /// How many bytes can be left: exactly, or, for a packed file, what no data that deflate (RFC 1951) packed
-  /// exceeds, 1032 bytes for each.
+  /// How many bytes can be left: exactly, or, for a packed file, as many as it may unpack to and as deflate
+  /// (RFC 1951) can pack, which is 1032 for each.
   std::uint64_t most_left() const;
+
+  /// "the file has 7 left for them", for a refusal of what needs more, where `left` of most_left() are left;
+  /// says what to do where the file is packed and might hold more.
+  std::string left_for_them(std::uint64_t left) const;
 
  private:
   struct Unpacker;
@@ -55,6 +63,7 @@ class BlockReader {
   std::size_t read(char* to, std::size_t n);
   std::size_t read_stored(char* to, std::size_t n);
   std::size_t unpack(char* to, std::size_t n);
+  std::string unpack_it_yourself() const;
   bool begin_member();
 
   std::string path_;

@@ -10,6 +10,8 @@
 namespace trilha {
 namespace {
 
+using namespace std::string_literals;
+
 class OffReader {
  public:
   explicit OffReader(const std::string& path) : path_(path), bytes_(path), text_(bytes_, '#'), mesh_(path) {}
@@ -58,8 +60,8 @@ class OffReader {
     const std::uint64_t left = bytes_.most_left() + 1;  // the last line may lack its end
     if (vertices_ * of_vertex + faces_ * 2 > left)
       text_.refuse_here(std::to_string(vertices_) + " vertices and " + std::to_string(faces_) +
-                        " faces take at least " + std::to_string(of_vertex) +
-                        " and 2 bytes each; the file has " + std::to_string(left) + " left for them");
+                        " faces take at least " + std::to_string(of_vertex) + " and 2 bytes each; " +
+                        bytes_.left_for_them(left));
   }
 
   /// How long the keyword is that the text stands at: 0 where there is none, as Geomview allows. Data sets
@@ -150,8 +152,18 @@ class OffReader {
                           std::to_string(vertices_) + ", counted from 0");
       corners_.push_back(static_cast<std::uint32_t>(index));
     }
-    face_colours_ |= !text_.line_ends();
+    colour_of_face();
     mesh_.add_face(corners_, faces_);
+  }
+
+  /// Goes over it, if there is one: a number in a table of colours, or 3 or 4 numbers.
+  void colour_of_face() {
+    int n = 0;
+    for (; n < 5 && !text_.line_ends(); ++n) text_.real<float>("a colour");
+    if (n == 2 || n == 5)
+      text_.refuse_here((n == 2 ? "2"s : "more than 4"s) +
+                        " numbers after a face's last vertex; a colour there has 1, 3 or 4");
+    face_colours_ |= n > 0;
   }
 
   const std::string& path_;

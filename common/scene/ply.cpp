@@ -247,7 +247,7 @@ class HeaderReader {
         least += ascii ? 2 : info(property.count.value_or(property.type)).size;
       if (least > 0 && element.count > left / least)
         refuse_it(std::to_string(element.count) + " times " + in_quotes(element.name) + " take at least " +
-                  counted(least, "byte") + " each; the file has " + std::to_string(left) + " left for them");
+                  counted(least, "byte") + " each; " + bytes_.left_for_them(left));
       left -= least * element.count;
       if (element.count == 0) continue;
       if (element.kind == Kind::vertex) {

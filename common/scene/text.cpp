@@ -90,13 +90,22 @@ namespace {
 
 constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
 
-/// Refuses bytes that are in no text; so many lines came before.
-void check_text(const std::string& path, std::string_view text, std::size_t lines) {
+/// How many lines end in the text, which follows the byte `before`: in \n, \r\n or \r, as for Statements.
+std::size_t line_ends(std::string_view text, char before) {
+  auto ends = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  if (before == '\r' && text.starts_with('\n')) --ends;  // its line ended before
+  for (std::size_t at = text.find('\r'); at != text.npos; at = text.find('\r', at + 1))
+    ends += !text.substr(at + 1).starts_with('\n');
+  return ends;
+}
+
+/// Refuses bytes that are in no text; so many lines came before, and that byte.
+void check_text(const std::string& path, std::string_view text, std::size_t lines, char before) {
   unsigned any = 0;
   for (const char c : text) any |= unsigned{is_binary(c)};  // without a branch: many bytes at a time
   if (any == 0) return;
   const auto binary = std::find_if(text.begin(), text.end(), is_binary);
-  lines += 1 + static_cast<std::size_t>(std::count(text.begin(), binary, '\n'));
+  lines += 1 + line_ends({text.begin(), binary}, before);
   refuse(path, lines,
          "byte " + std::to_string(static_cast<int>(*binary)) + " is in no text; a text file is wanted");
 }
@@ -150,7 +159,7 @@ T parsed(std::string_view word, const std::string& path, std::size_t line) {
 
 std::string read_text(const std::string& path) {
   std::string text = read_bytes(path);
-  check_text(path, text, 0);
+  check_text(path, text, 0, ' ');
   return text;
 }
 
@@ -168,8 +177,10 @@ std::size_t TextFile::read(char* to, std::size_t room) {
   file_.read(to, static_cast<std::streamsize>(room));
   if (file_.bad()) refuse(path_, 0, "cannot be read to its end; check the disk");
   const auto size = static_cast<std::size_t>(file_.gcount());
-  check_text(path_, {to, size}, lines_);
-  lines_ += static_cast<std::size_t>(std::count(to, to + size, '\n'));
+  const std::string_view text(to, size);
+  check_text(path_, text, lines_, last_);
+  lines_ += line_ends(text, last_);
+  if (size > 0) last_ = text.back();
   return size;
 }
 

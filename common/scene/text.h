@@ -59,7 +59,8 @@ class TextFile {
   std::string path_;
   std::ifstream file_;
   std::size_t size_ = 0;
-  std::size_t lines_ = 0;  // that were read
+  std::size_t lines_ = 0;  // that ended in what was read
+  char last_ = ' ';        // byte of it
 };
 
 /// Walks over the statements of a text: lines that are neither blank nor comments. A backslash before the end
