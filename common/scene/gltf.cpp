@@ -34,7 +34,17 @@ namespace fs = std::filesystem;
 constexpr double largest = std::numeric_limits<float>::max();
 constexpr std::int64_t most_elements = 4294967294;          // what 32 bits number
 constexpr std::int64_t most_bytes = std::int64_t{1} << 53;  // up to there a double is a whole number
-constexpr std::size_t most_per_byte = 4;  // triangles: a strip of bytes has one, and bytes may be shared
+
+// What the bytes of the buffers may become, in triangles and vertices. Honest files have less than two a
+// byte: a strip of bytes has one triangle, a vertex is three at least. What is shared brings more out of the
+// same bytes, such as a cube in a thousand colours: so each primitive brings a few of its own, and so does
+// the file.
+constexpr std::size_t most_per_byte = 2;
+constexpr std::size_t free_per_primitive = 64;
+constexpr std::size_t free_per_file = std::size_t{1} << 16;
+constexpr std::size_t most_free = std::size_t{1} << 20;
+constexpr std::size_t most_zeros = std::size_t{1} << 20;  // elements that no buffer holds
+constexpr std::size_t most_instances = std::size_t{1} << 22;
 
 // The file, and the objects in it.
 
@@ -272,19 +282,36 @@ class File {
     return static_cast<std::size_t>(of->whole(key, otherwise.value_or(low), low, high));
   }
 
-  /// To be called before so many triangles or instances are made, or elements looked at. A file whose objects
-  /// share their bytes could ask for any number of them.
+  /// To be called before so many triangles, vertices or instances (as four) are made out of buffers, or
+  /// elements looked at. A file whose objects share their bytes could ask for any number of them.
   void charge(std::size_t elements, const Item& by) {
     charged_ += elements;
-    if (charged_ > most_per_byte * size_)
-      by.refuse("brings what the file makes of its " + counted(size_, "byte") + " to " +
-                std::to_string(charged_) + " triangles (an instance counts as four); " +
-                std::to_string(most_per_byte) + " a byte are the most");
+    if (charged_ > most_per_byte * buffer_bytes_ + free_)
+      by.refuse("brings what the file makes of " + counted(buffer_bytes_, "byte") + " of buffers to " +
+                std::to_string(charged_) + " triangles and vertices (an instance counts as four); " +
+                std::to_string(most_per_byte) + " a byte and " + std::to_string(free_) +
+                " besides are the most");
+  }
+  void charge_primitive() { free_ = std::min(free_ + free_per_primitive, most_free); }
+
+  /// To be called before elements of zeros are made, which take no bytes of the file.
+  void charge_zeros(std::size_t elements, const Item& by) {
+    zeros_ += elements;
+    if (zeros_ > most_zeros)
+      by.refuse("brings elements without a buffer view, which are zeros, to " + std::to_string(zeros_) +
+                "; " + std::to_string(most_zeros) + " are the most in a file");
+  }
+
+  /// To be called before so many instances are made.
+  void charge_instances(std::size_t count, const Item& by) {
+    instances_ += count;
+    if (instances_ > most_instances)
+      by.refuse("brings the instances to " + std::to_string(instances_) + "; " +
+                std::to_string(most_instances) + " are the most in a file");
   }
 
  private:
   Json parse() {
-    size_ = bytes_.size();
     if (bytes_.empty()) refuse(path, 0, "is empty; a glTF file is JSON, or begins with \"glTF\"");
     if (bytes_.starts_with("glTF")) return parse_json(path, json_chunk());
     Json json = parse_json(path, bytes_);
@@ -322,6 +349,7 @@ class File {
         text = contents;
       } else if (chunk == 1 && kind == binary) {
         binary_ = contents;
+        buffer_bytes_ += contents.size();
       }
       at += chunk_header + contents.size();
     }
@@ -350,6 +378,7 @@ class File {
         buffer.refuse("has no bytes; name its file as 'uri', or save it uncompressed");
     } else if (std::optional<std::string> data = this->data(buffer)) {
       bytes = data_.emplace_back(std::make_unique<std::string>(std::move(*data))).operator*();
+      buffer_bytes_ += bytes.size();
     } else {
       // Once, however often and by which ways it is named.
       const fs::path file = named(buffer);
@@ -361,7 +390,7 @@ class File {
         } catch (const InputError& error) {  // which names that file alone
           buffer->refuse_key("uri", std::string("names what is not there to read: ") + error.what());
         }
-        size_ += found->second.size();
+        buffer_bytes_ += found->second.size();
       }
       bytes = found->second;
     }
@@ -372,10 +401,10 @@ class File {
     return *known;
   }
 
-  std::string bytes_;        // of a .glb
-  std::string_view binary_;  // in them
-  std::size_t size_ = 0;     // of the file and its buffers so far
-  std::size_t charged_ = 0;
+  std::string bytes_;             // of a .glb
+  std::string_view binary_;       // in them
+  std::size_t buffer_bytes_ = 0;  // that are there, of buffers that were read so far
+  std::size_t charged_ = 0, free_ = free_per_file, zeros_ = 0, instances_ = 0;
   Json json_;
   std::array<const std::vector<Json>*, list_names.size()> lists_{};
   std::vector<std::optional<std::string_view>> buffers_;
@@ -561,6 +590,8 @@ class Accessors {
     accessor.count = File::whole(item, "count", 1, most_elements);
     if (item->has("bufferView"))
       accessor.elements = place(item, accessor.count, accessor.components, accessor.elements.format);
+    else
+      file_.charge_zeros(accessor.count, item);
     if (item->has("sparse")) read_sparse(item.part("sparse"), accessor);
     return accessor;
   }
@@ -934,6 +965,7 @@ class Meshes {
       ++without_positions_;
       return std::nullopt;
     }
+    file_.charge_primitive();
     morphed_ += primitive->has("targets");
     coloured_ += attributes->has("COLOR_0");
     const auto attribute = [&](const char* key, const Wanted& wanted) -> const Accessor* {
@@ -992,6 +1024,7 @@ class Meshes {
       const std::vector<std::uint32_t> used = renumber(source, mesh.positions.size(), mesh.triangles);
       if (mesh.positions.size() + used.size() > most_elements)
         item.refuse("has more than 4294967294 vertices; split it");
+      file_.charge(used.size(), item);
       for (const std::uint32_t vertex : used)
         mesh.positions.push_back(vec3(value(*source.positions, vertex)));
       if (has_coordinates) {
@@ -1205,6 +1238,7 @@ class Nodes {
     if (!mesh) return;
     skinned_ += node->has("skin");
     if (!node.has_extension("EXT_mesh_gpu_instancing")) {
+      file_.charge_instances(1, node);  // the node itself is what it takes of the file
       scene_.instances.push_back({*mesh, -1, here});
       return;
     }
@@ -1225,6 +1259,7 @@ class Nodes {
     }
     if (count == 0) attributes.refuse("place nothing; TRANSLATION, ROTATION or SCALE do");
     constexpr std::size_t in_triangles = 4;  // what one takes in memory
+    file_.charge_instances(count, node);
     file_.charge(in_triangles * count, node);
     for (std::size_t i = 0; i < count; ++i) {
       const Vec4<double> turn = turns != nullptr ? (*turns)[i] : Vec4<double>(0, 0, 0, 1);

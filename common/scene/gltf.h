@@ -28,8 +28,11 @@ namespace trilha {
 ///
 /// Throws InputError, with the key's line, for what is malformed, reaches beyond its buffer, requires an
 /// extension that is not read, or has a node with two parents, in a circle, or with a singular transform; for
-/// numbers that are not finite as floats; and where primitives that share their bytes would have more than 4
-/// triangles for each byte of the file and its buffers.
+/// numbers that are not finite as floats. Limits, said before memory is taken, so that objects which share
+/// their bytes do not multiply them: of triangles, vertices and elements of sparse accessors together 2 for
+/// each byte of the buffers that is there, and besides 2¹⁶ and 64 for each primitive, these at most 2²⁰; of
+/// instances 2²², where those of EXT_mesh_gpu_instancing count as four of the former; of elements without a
+/// buffer view 2²⁰; and those of parse_json.
 Scene load_gltf(const std::string& path, const LoadOptions& options = {});
 
 }  // namespace trilha

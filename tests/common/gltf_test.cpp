@@ -1194,17 +1194,41 @@ TEST_CASE("files that would grow are refused before they do") {
   Model zeros;  // an accessor without a buffer view is all zeros
   zeros.push("accessors", {{"componentType", f32}, {"count", 4294967292u}, {"type", "VEC3"}});
   zeros.mesh(J::array({{{"attributes", {{"POSITION", 0}}}}}));
-  check_refused(zeros.text(), "4 a byte are the most");
+  check_refused(zeros.text(), "1048576 are the most in a file");
   zeros.json["accessors"][0]["count"] = 4294967294u;
   zeros.json["meshes"][0]["primitives"][0]["mode"] = 5;
-  check_refused(zeros.text(), "4 a byte are the most");
+  check_refused(zeros.text(), "1048576 are the most in a file");
+
+  // Zeros are counted once for each accessor, and what is made of them is made of no bytes: spaces are none.
+  zeros.json["accessors"][0]["count"] = 1 << 20;
+  check_refused(zeros.text() + std::string(2 << 20, ' '),
+                "what the file makes of 0 bytes of buffers to 1048574");
+  zeros.json["accessors"][0]["count"] = 1 << 19;
+  zeros.json["accessors"].push_back(zeros.json["accessors"][0]);
+  zeros.push("accessors", {{"componentType", f32}, {"count", 1}, {"type", "VEC3"}});
+  J& attributes = zeros.json["meshes"][0]["primitives"][0]["attributes"];
+  attributes["NORMAL"] = 1;
+  check_refused(zeros.text(), "triangles and vertices");
+  attributes["NORMAL"] = 2;
+  zeros.json["accessors"][1]["count"] = 5;
+  attributes["TEXCOORD_0"] = 1;
+  zeros.json["accessors"][2]["count"] = 1 << 19;
+  zeros.json["accessors"][1]["type"] = "VEC2";
+  check_refused(zeros.text(), "1048581; 1048576 are the most in a file");
+
+  // Vertices take more memory than triangles, and each mesh has its own.
+  Model vertices;
+  const std::size_t points = vertices.accessor(std::vector<vec3>(30000));
+  for (int i = 0; i < 20; ++i)
+    vertices.mesh(J::array({{{"attributes", {{"POSITION", points}, {"NORMAL", points}}}}}));
+  check_refused(vertices.glb(), "2 a byte and ", -1);  // 10000 triangles each alone would pass
 
   Model again;
   const std::size_t strip = again.accessor(std::vector<vec3>(30000));
   J primitives = J::array();
   for (int i = 0; i < 2000; ++i) primitives.push_back({{"attributes", {{"POSITION", strip}}}, {"mode", 5}});
   again.mesh(primitives);
-  check_refused(again.glb(), "4 a byte are the most");
+  check_refused(again.glb(), "2 a byte and ");
 
   Model sparse;  // a place is looked at for each accessor that names it
   const std::vector<std::uint32_t> places = [] {
@@ -1215,7 +1239,8 @@ TEST_CASE("files that would grow are refused before they do") {
   const std::size_t indices = sparse.view(bytes_of(places)), values = sparse.view(std::string(360000, '\0'));
   primitives = J::array();
   for (int i = 0; i < 2000; ++i) {
-    const J accessor = {{"componentType", f32},
+    const J accessor = {{"bufferView", values},
+                        {"componentType", f32},
                         {"count", 30000},
                         {"type", "VEC3"},
                         {"sparse",
@@ -1225,7 +1250,7 @@ TEST_CASE("files that would grow are refused before they do") {
     primitives.push_back({{"attributes", {{"POSITION", sparse.push("accessors", accessor)}}}});
   }
   sparse.mesh(primitives);
-  check_refused(sparse.glb(), "4 a byte are the most");
+  check_refused(sparse.glb(), "2 a byte and ");
 
   Model instanced;
   instanced.triangle();
@@ -1234,7 +1259,17 @@ TEST_CASE("files that would grow are refused before they do") {
     instanced.push(
         "nodes", {{"mesh", 0},
                   {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", moves}}}}}}}});
-  check_refused(instanced.glb(), "4 a byte are the most");
+  check_refused(instanced.glb(), "2 a byte and ");
+
+  // An instance is one, whether a node of its own or a list brings it.
+  Model forest;
+  forest.triangle();
+  const J turns = forest.accessor(std::vector<std::uint8_t>(std::size_t{4} << 22, 127), "VEC4", i8, 4, true);
+  forest.push("nodes", {{"mesh", 0}});
+  forest.push(
+      "nodes",
+      {{"mesh", 0}, {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"ROTATION", turns}}}}}}}});
+  check_refused(forest.glb(), "brings the instances to 4194305; 4194304 are the most");
 
   // Many meshes that have a few of many vertices each are nothing to refuse, and take no time.
   Model few;
@@ -1245,6 +1280,45 @@ TEST_CASE("files that would grow are refused before they do") {
   const Scene scene = loaded(few);
   CHECK(scene.meshes.size() == 3000);
   CHECK(scene.vertex_count() == 9000);
+}
+
+// Catches: a limit that honest files meet, which pack their vertices, or show one mesh in many colours.
+TEST_CASE("what honest files share is not refused") {
+  Model packed;  // a strip of bytes over positions and normals of bytes, as dense as files come
+  packed.json["extensionsUsed"] = packed.json["extensionsRequired"] = {"KHR_mesh_quantization"};
+  J primitives = J::array();
+  for (int strip = 0; strip < 2000; ++strip) {
+    std::vector<std::int8_t> numbers;
+    std::vector<std::uint8_t> corners;
+    for (int i = 0; i < 128; ++i) {
+      for (const int number : {i % 2, i / 2, strip % 100, 0})
+        numbers.push_back(static_cast<std::int8_t>(number));
+      for (int k = 0; k < 2; ++k) corners.push_back(static_cast<std::uint8_t>((i + k * 3) % 128));
+    }
+    const J positions = packed.push("accessors", {{"bufferView", packed.view(bytes_of(numbers), 4)},
+                                                  {"componentType", i8},
+                                                  {"count", 128},
+                                                  {"type", "VEC3"}});
+    primitives.push_back(
+        {{"attributes", {{"POSITION", positions}}}, {"indices", packed.accessor(corners)}, {"mode", 5}});
+  }
+  packed.mesh(primitives);
+  CHECK(loaded(packed).triangle_count() > 400000);
+
+  Model colours;  // one cube, with vertices of its own for each face, in each of ten thousand materials
+  const std::size_t points = colours.accessor(std::vector<vec3>(24, vec3(1)));
+  const std::size_t normals = colours.accessor(std::vector<vec3>(24, vec3(0, 0, 1)));
+  std::vector<std::uint8_t> corners(36);
+  for (std::size_t i = 0; i < 36; ++i) corners[i] = static_cast<std::uint8_t>(i % 24);
+  const std::size_t indices = colours.accessor(corners);
+  for (int i = 0; i < 10000; ++i) {
+    colours.push("materials", J::object());
+    colours.mesh(J::array({{{"attributes", {{"POSITION", points}, {"NORMAL", normals}}},
+                            {"indices", indices},
+                            {"material", i}}}));
+    colours.push("nodes", {{"mesh", i}, {"translation", {i, 0, 0}}});
+  }
+  CHECK(loaded(colours).triangle_count() == 120000);
 }
 
 // Catches: a file that is read for each buffer that names it.
