@@ -217,7 +217,10 @@ class Reader {
       libraries.push_back({std::string(statements_.rest()), statements_.line()});
       if (libraries.back().name.empty())
         refuse_here("mtllib without a name; write it like \"mtllib house.mtl\"");
-    } else if (keyword != "s" && !element(keyword)) {
+    } else if (keyword == "s") {
+      const std::string_view group = statements_.word();
+      in_smoothing_group_ = group != "off" && group.find_first_not_of('0') != std::string_view::npos;
+    } else if (!element(keyword)) {
       if (keyword == "curv" || keyword == "curv2" || keyword == "surf") in_body_ = true;
       if (keyword == "end") in_body_ = false;
       known = false;
@@ -227,14 +230,14 @@ class Reader {
     any_known_ |= known;
   }
 
-  /// The numbers of the statement, the first three; 0 where there are fewer.
+  /// The numbers of the statement, the first three; 0 where there are fewer. Counts what the others say.
   std::array<float, 3> numbers(Kind kind) {
     statements_.drop_comment();
-    std::array<float, 3> values{};
+    std::array<float, 4> values{};
     std::size_t count = 0;
     for (std::string_view word = statements_.word(); !word.empty(); word = statements_.word(), ++count) {
       const float value = parse_float(word, path_, statements_.line());
-      if (count < 3) values[count] = value;
+      if (count < 4) values[count] = value;
     }
     // v x y z, with a weight, a colour or both; vt u [v [w]]; vn x y z
     const bool right = kind == position             ? count == 3 || count == 4 || count == 6 || count == 7
@@ -245,7 +248,13 @@ class Reader {
                   kinds[kind].name + (kind == texture_coordinate ? " has 2" : " has 3"));
     }
     if (defined(kind) == most_vertices) refuse_here("more than 2147483647 vertices; split the file");
-    return values;
+    if (kind == position) {
+      weights_ += (count == 4 || count == 7) && values[3] != 1;
+      colours_ += count >= 6;
+    } else if (kind == texture_coordinate) {
+      depths_ += values[2] != 0;
+    }
+    return {values[0], values[1], values[2]};
   }
 
   // Faces.
@@ -278,13 +287,15 @@ class Reader {
     const std::uint32_t mesh_number = names_.number(), material = materials.number();
     GrowingMesh& mesh = meshes[mesh_number];
     polygon_.clear();
-    bool all_defined = true;
+    bool all_defined = true, has_normals = true;
     for (const Corner& corner : corners_) {
       const std::size_t before = mesh.vertices.size();
       polygon_.push_back(mesh.number(corner, salt_));
       vertex_count_ += mesh.vertices.size() - before;
+      has_normals &= corner.index[normal] >= 0;
       all_defined &= static_cast<std::size_t>(corner.index[position]) < positions.size();
     }
+    not_smoothed_ += in_smoothing_group_ && !has_normals;  // normals take precedence
     if (vertex_count_ > most_vertices) refuse(path_, 0, "more than 2147483647 vertices; split the file");
     if (polygon_.size() > 3 && all_defined) {
       split(mesh);
@@ -463,6 +474,19 @@ class Reader {
     if (points_ > 0) warnings.push_back(path_ + ": " + counted(points_, "point") + " (p) ignored");
     if (area_lights_ > 0)
       warnings.push_back(path_ + ": " + counted(area_lights_, "disc or quad light") + " (ld, lq) ignored");
+    if (weights_ > 0) {
+      warnings.push_back(path_ + ": " + counted(weights_, "vertex weight") +
+                         " other than 1 ignored: the shape is another where they count");
+    }
+    if (colours_ > 0) warnings.push_back(path_ + ": " + counted(colours_, "vertex colour") + " ignored");
+    if (depths_ > 0) {
+      warnings.push_back(path_ + ": " + counted(depths_, "third texture coordinate") +
+                         " other than 0 ignored");
+    }
+    if (not_smoothed_ > 0) {
+      warnings.push_back(path_ + ": " + counted(not_smoothed_, "face") +
+                         " without vn in smoothing groups (s), which are ignored");
+    }
     if (others_ > 0) {
       warnings.push_back(path_ + ": " + counted(others_, "unknown statement") + " ignored, the first " +
                          first_other_);
@@ -477,11 +501,12 @@ class Reader {
   TextFile file_;
   Statements statements_;
   std::uint64_t salt_ = 0;
-  bool any_known_ = false, in_body_ = false;
+  bool any_known_ = false, in_body_ = false, in_smoothing_group_ = false;
   std::string object_;
   Names names_;  // of meshes
   std::size_t triangle_count_ = 0, vertex_count_ = 0;
   std::size_t lines_ = 0, edges_ = 0, points_ = 0, area_lights_ = 0, others_ = 0, crossed_ = 0;
+  std::size_t weights_ = 0, colours_ = 0, depths_ = 0, not_smoothed_ = 0;
   std::string first_other_;
   std::array<std::vector<ForwardReference>, 3> forward_;
   std::vector<Deferred> deferred_;

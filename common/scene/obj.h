@@ -30,9 +30,11 @@ namespace trilha {
 /// Throws InputError where the file cannot be read, a statement that is understood is malformed, a number is
 /// not finite as a float, a face, line or point names a vertex that does not exist, a material library or
 /// image lies where none may be read (named_file), or a library is refused. What is left out or mended is
-/// said in Scene::warnings: lines, points, faces of one or two corners and other statements, libraries that
-/// are not there, materials that no library defines (they are grey), normals of no length. Limits: 2³¹ − 1
-/// vertices, 2³² − 2 triangles, 10 000 corners a face, 2²⁴ bytes a statement.
+/// said in Scene::warnings, a warning a kind: lines, points, faces of one or two corners, weights of vertices
+/// other than 1, their colours, third texture coordinates other than 0, faces without normals in smoothing
+/// groups (s) and other statements, polygons that cross themselves, libraries that are not there, materials
+/// that no library defines (they are grey), normals of no length. Limits: 2³¹ − 1 vertices, 2³² − 2 triangles,
+/// 10 000 corners a face, 2²⁴ bytes a statement.
 Scene load_obj(const std::string& path, const LoadOptions& options = {});
 
 }  // namespace trilha

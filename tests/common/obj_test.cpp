@@ -219,6 +219,25 @@ TEST_CASE("lines and points are checked, then ignored") {
   }
 }
 
+// Catches: what is left out in silence, and warnings of what says nothing.
+TEST_CASE("weights, colours, third texture coordinates and smoothing groups are counted, then ignored") {
+  const Folder folder;
+  Scene scene = loaded(folder,
+                       "v 0 0 0 0.5\nv 1 0 0 1\nv 0 1 0 2 1 0 0\nv 0 0 1 1 1 1\nv 0 0 2 1 0 0 0\n"
+                       "vt 0 0 5\nvt 0 1 0\nvt 1\nvt 0 0 -1e-30\nvt 1 1 2\ns 1\nf 1/1 2/2 3/3\n"
+                       "s off\nf 1 2 4\ns 12 # round\nf 1 2 5\ns 0\ns\n");
+  CHECK(scene.triangle_count() == 3);
+  CHECK(scene.warnings.size() == 4 + 1);  // with corners without a texture coordinate
+  CHECK(warns_of(scene, "2 vertex weights other than 1 ignored"));
+  CHECK(warns_of(scene, "3 vertex colours ignored"));
+  CHECK(warns_of(scene, "3 third texture coordinates other than 0 ignored"));
+  CHECK(warns_of(scene, "2 faces without vn in smoothing groups (s), which are ignored"));
+  scene = loaded(folder,
+                 "v 0 0 0 1\nv 1 0 0 1.0\nv 0 1 0\nvt 0 0 0\ns 0\n"
+                 "f 1/1 2/1 3/1\nvn 0 0 1\ng b\ns 1\nf 1/1/1 2/1/1 3/1/1\n");
+  CHECK(scene.warnings.empty());
+}
+
 // Catches: time with the square of what a file holds where one face has it all.
 TEST_CASE("a face of 100000 corners is refused at once") {
   std::string text = triangle + "f";
