@@ -234,6 +234,9 @@ Scene load_entry(const SceneEntry& entry, LoadOptions options) {
     scene.camera.target = box.centre();
     scene.camera.eye =
         box.centre() + portrait->distance * glm::length(box.size()) * glm::normalize(portrait->towards_eye);
+  } else if (!entry.collection.empty()) {
+    scene.camera =
+        framing(bounds(scene), vec3(0, 1, 0));  // things, not rooms: a cupboard is no place to stand in
   }
   return scene;
 }
