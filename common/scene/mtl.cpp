@@ -76,6 +76,14 @@ std::string written(float value) {
 
 }  // namespace
 
+void Listed::add(std::string_view name) {
+  if (++count_ <= most) text_ += (text_.empty() ? "" : ", ") + in_quotes(name);
+}
+
+std::string Listed::text() const {
+  return count_ <= most ? text_ : text_ + " and " + std::to_string(count_ - most) + " more";
+}
+
 /// Reads one library.
 class MaterialLibraries::Reader {
  public:
@@ -386,7 +394,7 @@ std::optional<vec3> MaterialLibraries::light_of(const std::string& name) const {
 }
 
 std::optional<Material> MaterialLibraries::material(const std::string& name, TextureSet& textures,
-                                                    const LoadOptions& options, Scene& scene) const {
+                                                    const LoadOptions& options, Scene& scene) {
   const auto found = definitions_.find(name);
   if (found == definitions_.end()) return std::nullopt;
   const Definition& definition = found->second;
@@ -427,16 +435,27 @@ std::optional<Material> MaterialLibraries::material(const std::string& name, Tex
       return said.gain >= 0 && number * said.gain <= (is_number ? 1 : largest);
     });
     for (float& number : numbers) number *= fits ? said.gain : 1;
-    if (!fits)
-      scene.warnings.push_back(definition.library + ":" + std::to_string(said.line) +
-                               ": -mm with a gain of " + written(said.gain) +
-                               " ignored: it leads out of the range");
+    if (!fits) beyond_range_.add(name, definition.library, said.line);
   }
-  if (material.opacity == 0)
-    scene.warnings.push_back(definition.library + ":" + std::to_string(definition.line) + ": material " +
-                             in_quotes(name) +
-                             " is not to be seen (d 0); some programs write Tr 1 and mean d 1");
+  if (material.opacity == 0) invisible_.add(name, definition.library, definition.line);
   return material;
+}
+
+void MaterialLibraries::Remark::add(const std::string& name, const std::string& library, std::size_t line) {
+  if (names.empty()) place = library + ":" + std::to_string(line) + ": ";
+  names.add(name);
+}
+
+void MaterialLibraries::warn(std::vector<std::string>& warnings) const {
+  if (!beyond_range_.names.empty()) {
+    warnings.push_back(beyond_range_.place + "-mm ignored where its gain leads out of the range: material " +
+                       beyond_range_.names.text());
+  }
+  if (!invisible_.names.empty()) {
+    warnings.push_back(invisible_.place +
+                       "not to be seen (d 0), where some programs write Tr 1 and mean d 1: " + "material " +
+                       invisible_.names.text());
+  }
 }
 
 }  // namespace trilha

@@ -5,11 +5,26 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/scene/scene.h"
 
 namespace trilha {
+
+/// Names in quotes, a few of them: a warning does not grow with the file.
+class Listed {
+ public:
+  static constexpr std::size_t most = 8;
+
+  void add(std::string_view name);
+  bool empty() const { return count_ == 0; }
+  std::string text() const;  ///< "'a', 'b' and 3 more"
+
+ private:
+  std::size_t count_ = 0;
+  std::string text_;
+};
 
 /// What material libraries say, as long as no one has asked for it: no image is read before.
 ///
@@ -46,11 +61,13 @@ class MaterialLibraries {
   /// illum.
   void read(const std::string& path, std::vector<std::string>& warnings);
 
-  /// The material of that name, with its maps in scene.textures, and warnings in scene.warnings; none where
-  /// no library defines it. Throws InputError where an image is refused or lies where none may be read
-  /// (named_file).
+  /// The material of that name, with its maps in scene.textures; none where no library defines it. Throws
+  /// InputError where an image is refused or lies where none may be read (named_file).
   std::optional<Material> material(const std::string& name, TextureSet& textures, const LoadOptions& options,
-                                   Scene& scene) const;
+                                   Scene& scene);
+
+  /// Adds what there is to say about the materials that were asked for: a line a kind, which names eight.
+  void warn(std::vector<std::string>& warnings) const;
 
   /// What a light that has the material of that name gives off: its Kd, or its Ke where that is not black.
   std::optional<vec3> light_of(const std::string& name) const;
@@ -82,7 +99,16 @@ class MaterialLibraries {
 
   static Material made(const std::string& name, const Definition& definition);
 
+  /// Materials of which there is the same to say.
+  struct Remark {
+    Listed names;
+    std::string place;  // of the first
+
+    void add(const std::string& name, const std::string& library, std::size_t line);
+  };
+
   std::map<std::string, Definition> definitions_;
+  Remark invisible_, beyond_range_;
 };
 
 }  // namespace trilha

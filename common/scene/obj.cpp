@@ -519,33 +519,21 @@ class Reader {
 
 // Materials.
 
-/// Names in quotes, a few of them.
-class Listed {
- public:
-  void add(std::string_view name) {
-    if (++count_ <= 8) text_ += (text_.empty() ? "" : ", ") + in_quotes(name);
-  }
-  bool empty() const { return count_ == 0; }
-  std::string text() const {
-    return count_ <= 8 ? text_ : text_ + " and " + std::to_string(count_ - 8) + " more";
-  }
-
- private:
-  std::size_t count_ = 0;
-  std::string text_;
-};
-
 /// Reads the libraries that the file names. A library's name may hold spaces; else the spaces separate names.
 MaterialLibraries read_libraries(const std::string& path, const std::vector<Reader::Library>& libraries,
                                  const LoadOptions& options, std::vector<std::string>& warnings) {
   MaterialLibraries result;
   std::set<std::filesystem::path> seen;
+  std::size_t with_warnings = 0;
   const auto read = [&](const std::string& name, std::size_t line) {
     const std::filesystem::path file = named_file(name, path, line, options);
     std::error_code error;
     if (!std::filesystem::is_regular_file(file, error)) return false;
-    if (seen.insert(std::filesystem::weakly_canonical(file, error)).second)
-      result.read(file.string(), warnings);
+    if (!seen.insert(std::filesystem::weakly_canonical(file, error)).second) return true;
+    std::vector<std::string> of_library;
+    result.read(file.string(), of_library);
+    if (!of_library.empty() && ++with_warnings <= Listed::most)
+      warnings.insert(warnings.end(), of_library.begin(), of_library.end());
     return true;
   };
   Listed missing;
@@ -561,6 +549,9 @@ MaterialLibraries read_libraries(const std::string& path, const std::vector<Read
       missing.add(name);
     }
   }
+  if (with_warnings > Listed::most)
+    warnings.push_back(path + ": warnings of " + std::to_string(with_warnings - Listed::most) +
+                       " more material libraries left out");
   if (!missing.empty())
     warnings.push_back(path + ":" + std::to_string(line_of_first) + ": no material library " +
                        missing.text());
@@ -568,7 +559,7 @@ MaterialLibraries read_libraries(const std::string& path, const std::vector<Read
 }
 
 void add_materials(const std::string& path, const std::vector<std::string>& names,
-                   const MaterialLibraries& libraries, const LoadOptions& options, Scene& scene) {
+                   MaterialLibraries& libraries, const LoadOptions& options, Scene& scene) {
   TextureSet textures(scene, options);
   Listed missing;
   for (const std::string& name : names) {
@@ -579,6 +570,7 @@ void add_materials(const std::string& path, const std::vector<std::string>& name
     }
     scene.materials.push_back(std::move(*found));
   }
+  libraries.warn(scene.warnings);
   if (!missing.empty()) {
     scene.warnings.push_back(path + ": no library defines the material " + missing.text() + ": grey instead");
   }
@@ -759,7 +751,7 @@ Scene load_obj(const std::string& path, const LoadOptions& given) try {
   bool camera_known = false;
   {
     Reader read(path, scene.warnings);
-    const MaterialLibraries libraries = read_libraries(path, read.libraries, options, scene.warnings);
+    MaterialLibraries libraries = read_libraries(path, read.libraries, options, scene.warnings);
     add_materials(path, read.materials.list, libraries, options, scene);
     camera_known = Elements(path, read, libraries, scene).camera_known();
     Build(path, read, scene);

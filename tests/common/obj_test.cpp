@@ -430,7 +430,8 @@ TEST_CASE("what materials say in vain is counted, and what cannot be seen is sai
       "map_Ka (1), refl (1), sharpness (1)"));
   CHECK(warns_of(scene, "test.mtl: 2 unknown statements ignored, the first 'foo' in line 11"));
   CHECK(warns_of(scene, "test.mtl: 1 material defined before"));
-  CHECK(warns_of(scene, "test.mtl:1: material 'a' is not to be seen"));
+  CHECK(warns_of(
+      scene, "test.mtl:1: not to be seen (d 0), where some programs write Tr 1 and mean d 1: material 'a'"));
   CHECK(scene.materials[0].diffuse == Material{}.diffuse);
   std::string many = "mtllib";
   for (int i = 0; i < 30; ++i) many += " l" + std::to_string(i);
@@ -440,6 +441,17 @@ TEST_CASE("what materials say in vain is counted, and what cannot be seen is sai
   CHECK(scene.warnings.size() == 2);
   CHECK(warns_of(scene, "'l7' and 22 more"));
   CHECK(warns_of(scene, "'m7' and 22 more: grey instead"));
+  std::string invisible;
+  for (int i = 0; i < 30; ++i) {
+    invisible += "newmtl m" + std::to_string(i) + "\nd 0\nmap_d -mm 0 -2 x.png\n";
+    write(folder / ("l" + std::to_string(i)), "newmtl l" + std::to_string(i) + "\nPs 1\n");
+  }
+  write(folder / "test.mtl", invisible);
+  scene = loaded(folder, many + "mtllib test.mtl\n");
+  CHECK(warns_of(scene, "material 'm0', 'm1', 'm2', 'm3', 'm4', 'm5', 'm6', 'm7' and 22 more"));
+  CHECK(warns_of(scene, "test.mtl:3: -mm ignored where its gain leads out of the range: material 'm0'"));
+  CHECK(warns_of(scene, "warnings of 22 more material libraries left out"));
+  CHECK(scene.warnings.size() <= 8 + 4);
 }
 
 // Catches: numbers that no surface has, options that are guessed at, and the line where they stand.
@@ -521,7 +533,7 @@ TEST_CASE("maps are found where their statements say, scaled, moved and turned u
 
   const std::string obj = "mtllib test.mtl\nusemtl a\n" + triangle + "f 1 2 3\n";
   CHECK(warns_of(loaded(folder, obj, "newmtl a\nmap_d -mm 0.2 0.8 a.png\n"), "ignored: -mm (1)"));
-  CHECK(warns_of(loaded(folder, obj, "newmtl a\nmap_d -mm 0 2 a.png\n"), "test.mtl:2: -mm with a gain of 2"));
+  CHECK(warns_of(loaded(folder, obj, "newmtl a\nmap_d -mm 0 2 a.png\n"), "test.mtl:2: -mm ignored"));
   const Scene unused = loaded(folder, obj, "newmtl a\nnewmtl b\nmap_Kd ../b.png\nbump ../b.png\n");
   CHECK(unused.textures.empty());  // and nobody asked where it lies
   const Scene named = loaded(folder, obj, "newmtl a\nmap_Kd textures\\my wood 1.png\nmap_d d.png\n");
