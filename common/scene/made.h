@@ -1,6 +1,7 @@
 #pragma once
 // Scenes that are made on demand, of any size: "--scene hall:detail=4,angle=30".
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,6 +38,15 @@ class Parameters {
   bool textures_;
 };
 
+/// What a made scene holds. Of each number at least what there will be, and at most twice that, but for
+/// scenes of fewer than 10 000 triangles.
+struct MadeSize {
+  std::uint64_t stored = 0;  ///< triangles in its meshes
+  std::uint64_t placed = 0;  ///< triangles as its instances place them
+  std::uint64_t bodies = 0;  ///< spheres and planes
+  std::uint64_t texels = 0;  ///< of its textures, without their smaller levels
+};
+
 struct MadeScene {
   const char* name;
   const char* what;  ///< for people, in a few words
@@ -44,6 +54,8 @@ struct MadeScene {
   /// Makes it: the same bits for the same parameters, on any machine (so no sin, cos or pow of the C library:
   /// common/math/turn.h has them).
   Scene (*make)(const Parameters&);
+  /// Says how large it will be, at once: scene files, which others write, name made scenes too.
+  MadeSize (*size)(const Parameters&);
 };
 
 /// All of them.

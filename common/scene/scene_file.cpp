@@ -62,7 +62,9 @@ constexpr std::uint64_t most_instances = 1u << 22;
 constexpr std::uint64_t most_bodies = 1u << 22;  // spheres and planes
 constexpr std::uint64_t most_lights = 1u << 16;
 constexpr std::uint64_t most_views = 10000;
-constexpr std::uint64_t most_made_triangles = 1u << 24;
+constexpr std::uint64_t most_multiplied = 1u << 20;      // instances beyond those that files write out
+constexpr std::uint64_t most_made_triangles = 1u << 22;  // stored, and placed
+constexpr std::uint64_t most_made_texels = 1u << 25;
 constexpr std::uint64_t most_texels = 1u << 28;
 constexpr double largest = std::numeric_limits<float>::max();
 constexpr double smallest = std::numeric_limits<float>::min();
@@ -156,12 +158,13 @@ std::optional<Scene> read_model(const std::string& path, const LoadOptions& opti
   const std::string name = lower_case(fs::path(path).filename().string());
   if (name.ends_with(".obj")) return load_obj(path, options);
   if (name.ends_with(".ply") || name.ends_with(".ply.gz")) return load_ply(path, options);
-  if (name.ends_with(".off")) return load_off(path, options);
+  if (name.ends_with(".off") || name.ends_with(".off.gz")) return load_off(path, options);
   if (name.ends_with(".gltf") || name.ends_with(".glb")) return load_gltf(path, options);
   if (name.ends_with(".json")) return std::nullopt;
   refuse(
       path, 0,
-      "is no scene that is known by its name's ending; .obj, .ply, .ply.gz, .off, .gltf, .glb and .json are");
+      "is no scene that is known by its name's ending; .obj, .ply, .ply.gz, .off, .off.gz, .gltf, .glb and "
+      ".json are");
 }
 
 // Transforms.
@@ -217,13 +220,18 @@ class Loader {
   /// What a surface has that was given no material.
   std::uint32_t default_material();
 
+  /// To be called for each file's own placements, of meshes and of files. Only as many instances, and some,
+  /// may come of them: files that include each other multiply what they place.
+  void wrote(std::size_t placements) { written_ += placements; }
+  std::uint64_t most_instances_now() const { return std::min(most_instances, most_multiplied + written_); }
+
   TextureSet& textures() { return textures_; }
   const LoadOptions& options() const { return options_; }
 
   Scene scene;
 
  private:
-  const Node* model(Scene from, const std::string& path);
+  const Node* model(Scene from, const std::string& path, std::size_t line);
   const Node* scene_file(const std::string& path);
   void expand(const Node& node, const Child& as, const std::string& path);
   void expand_bodies(const Node& node, const Child& as, const std::string& path);
@@ -237,8 +245,9 @@ class Loader {
   std::vector<std::unique_ptr<Node>> nodes_;
   std::map<std::string, const Node*> files_, made_;
   std::vector<std::pair<std::string, std::string>>
-      chain_;  // files being read: what they are, how they are named
-  std::uint64_t made_triangles_ = 0;
+      chain_;           // files being read: what they are, how they are named
+  MadeSize made_size_;  // of all so far
+  std::uint64_t written_ = 0;
   std::optional<std::uint32_t> default_material_;
   std::vector<double> reach_;  // of each mesh: its largest coordinate
   vec3 up_{0, 1, 0};
@@ -761,8 +770,9 @@ void Reader::read_lights() {
     if (light.attenuation == vec3(0))
       members.refuse_key("attenuation", "is (0, 0, 0); one of them is above 0");
     light.range = number(members, "range", light.range, 0, largest);
-    light.outer_angle = number(members, "outer_angle", light.outer_angle, 0.001, 90);
     light.inner_angle = number(members, "inner_angle", light.inner_angle, 0, 90);
+    light.outer_angle =
+        number(members, "outer_angle", std::max(light.outer_angle, light.inner_angle), 0.001, 90);
     if (light.inner_angle > light.outer_angle)
       members.refuse_key("inner_angle",
                          "is wider than 'outer_angle'; all light is inside where there is some");
@@ -847,12 +857,13 @@ void Reader::count() {
         refuse(path_, line,
                std::to_string(n) + " " + what + " so far; " + std::to_string(most) + " are the most");
     };
-    limit(sum.instances, most_instances, "instances");
+    limit(sum.instances, loader_.most_instances_now(), "instances");
     limit(sum.bodies, most_bodies, "spheres and planes");
     limit(sum.lights, most_lights, "lights");
     limit(sum.views, most_views, "views");
     limit(sum.places, most_instances, "places of files");
   };
+  loader_.wrote(node_.placements.size() + node_.children.size());
   sum = {node_.placements.size(), node_.spheres.size() + node_.planes.size(), node_.lights.size(),
          node_.views.size(), 1};
   check(0);
@@ -924,7 +935,7 @@ const Node* Loader::file(const std::string& name, const std::string& path, std::
   files_[real] = nullptr;
   chain_.emplace_back(real, fs::path(file).filename().string());
   std::optional<Scene> from = read_model(file, options_);
-  const Node* node = from ? model(std::move(*from), file) : scene_file(file);
+  const Node* node = from ? model(std::move(*from), file, 0) : scene_file(file);
   chain_.pop_back();
   return files_[real] = node;
 }
@@ -940,23 +951,31 @@ const Node* Loader::made(const std::string& text, const std::string& path, std::
     for (const auto& entry : all) names += (names.empty() ? "" : ", ") + entry.first;
     refuse(path, line, in_quotes(name) + " is no made scene; they are " + names);
   }
-  Scene from;
+  std::optional<Parameters> parameters;
   try {
     const std::string rest = text.size() > name.size() ? text.substr(name.size() + 1) : "";
-    from = found->second->make(Parameters(name, found->second->parameters, rest, options_));
+    parameters.emplace(name, found->second->parameters, rest, options_);
   } catch (const InputError& error) {
     refuse(path, line, error.what());
   }
-  for (const Mesh& mesh : from.meshes) made_triangles_ += mesh.triangles.size();
-  if (made_triangles_ > most_made_triangles)
-    refuse(path, line,
-           "made scenes of " + std::to_string(made_triangles_) + " triangles so far; " +
-               std::to_string(most_made_triangles) + " are the most in a scene file");
-  return made_[text] = model(std::move(from), name);
+  const MadeSize size = found->second->size(*parameters);
+  const auto add = [&](std::uint64_t MadeSize::*part, std::uint64_t most, const char* what) {
+    made_size_.*part += size.*part;
+    if (made_size_.*part > most)
+      refuse(path, line,
+             in_quotes(text) + " brings made scenes to " + std::to_string(made_size_.*part) + " " + what +
+                 "; " + std::to_string(most) + " are the most in a scene file");
+  };
+  add(&MadeSize::stored, most_made_triangles, "triangles");
+  add(&MadeSize::placed, most_made_triangles, "triangles as they are placed");
+  add(&MadeSize::bodies, most_bodies, "spheres");
+  add(&MadeSize::texels, most_made_texels, "texels");
+  Scene from = found->second->make(*parameters);
+  return made_[text] = model(std::move(from), path, line);
 }
 
 /// Takes over what another reader made.
-const Node* Loader::model(Scene from, const std::string& path) {
+const Node* Loader::model(Scene from, const std::string& path, std::size_t line) {
   nodes_.push_back(std::make_unique<Node>());
   Node& node = *nodes_.back();
   node.path = path;
@@ -1007,11 +1026,12 @@ const Node* Loader::model(Scene from, const std::string& path) {
   if (from.environment.colour != vec3(0))
     node.surroundings = std::make_shared<Surroundings>(Surroundings{std::move(from.environment), "", path});
   scene.warnings.insert(scene.warnings.end(), from.warnings.begin(), from.warnings.end());
+  wrote(node.placements.size());
   node.counts = {node.placements.size(), node.spheres.size() + node.planes.size(), node.lights.size(),
                  node.views.size(), 1};
   if (node.counts.instances > most_instances || node.counts.views > most_views ||
       node.counts.lights > most_lights)
-    refuse(path, 0,
+    refuse(path, line,
            "has too many instances, lights or views to be included; " + std::to_string(most_instances) +
                ", " + std::to_string(most_lights) + " and " + std::to_string(most_views) + " are the most");
   return &node;

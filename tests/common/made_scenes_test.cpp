@@ -311,6 +311,62 @@ TEST_CASE("parameters are taken strictly") {
 
 // ---- solids ---------------------------------------------------------------------
 
+// Catches: a size that is told too small, so that a scene file gets more than it may, or so large that it
+// gets far less; a scene that tells none.
+TEST_CASE("made scenes are as large as they say beforehand") {
+  std::vector<std::string> all = {"cornell_box:spheres=1",
+                                  "cornell_box:spheres=1,subdivisions=7,blocks=0",
+                                  "cornell_box:spheres=1,analytic=1",
+                                  "sphereflake:level=5,subdivisions=1",
+                                  "sphereflake:level=2,subdivisions=6,coarser=3",
+                                  "sphereflake:level=1,subdivisions=3,coarser=0",
+                                  "sphereflake:level=5,analytic=1",
+                                  "torus_knot:p=4,q=6,segments=601",
+                                  "torus_knot:segments=2000,sides=250",
+                                  "terrain:triangles=2",
+                                  "terrain:triangles=100001",
+                                  "teapot:quads=2",
+                                  "teapot:quads=31",
+                                  "teaset:quads=2",
+                                  "teaset:quads=31",
+                                  "hall:textures=64,detail=1",
+                                  "hall:textures=0,detail=12,bays=40",
+                                  "hall:textures=0,detail=26,bays=3"};
+  for (const MadeScene& made : made_scenes()) {
+    if (made.name != std::string("hall")) all.push_back(made.name);
+    for (const Parameter& parameter : made.parameters)
+      if (parameter.name == std::string("number") || parameter.name == std::string("case"))
+        for (double value = parameter.low; value <= parameter.high; ++value)
+          all.push_back(std::string(made.name) + ":" + parameter.name + "=" + std::to_string(int(value)));
+  }
+  for (int tenths = 10; tenths < 80; ++tenths)  // rounded up here and down there
+    for (const char* bays : {"3", "8", "40"})
+      all.push_back("hall:textures=0,detail=" + std::to_string(tenths / 10) + "." +
+                    std::to_string(tenths % 10) + ",bays=" + bays);
+  const auto holds = [](std::uint64_t said, std::uint64_t really) {
+    return said >= really && (said <= 2 * really || said < 10000);
+  };
+  for (const std::string& text : all) {
+    const std::string name = text.substr(0, text.find(':'));
+    const auto made = std::find_if(made_scenes().begin(), made_scenes().end(),
+                                   [&](const MadeScene& m) { return m.name == name; });
+    const Parameters parameters(name, made->parameters, text == name ? "" : text.substr(name.size() + 1));
+    const MadeSize said = made->size(parameters);
+    const Scene scene = made->make(parameters);
+    std::uint64_t stored = 0, texels = 0;
+    for (const Mesh& mesh : scene.meshes) stored += mesh.triangles.size();
+    for (const Texture& texture : scene.textures)
+      texels += std::uint64_t(texture.levels[0].width) * std::uint64_t(texture.levels[0].height);
+    INFO(text << " says " << said.stored << ", " << said.placed << ", has " << stored << ", "
+              << scene.triangle_count());
+    CHECK(holds(said.stored, stored));
+    CHECK(holds(said.placed, scene.triangle_count()));
+    CHECK(said.bodies == scene.spheres.size() + scene.planes.size());
+    CHECK(said.texels == texels);
+    CHECK(scene.instances.size() <= said.placed);
+  }
+}
+
 // Catches: a ring too many, a seam left open, a face turned over, slivers between rings.
 TEST_CASE("a sphere has exactly as many triangles as it is asked for") {
   for (std::uint32_t triangles = 12; triangles < 1300; triangles += triangles < 60 ? 2 : 46) {

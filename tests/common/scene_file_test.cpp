@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -695,7 +696,7 @@ TEST_CASE("what a scene file cannot mean is refused with line and key") {
       {"{\"lights\": [{\"kind\": \"point\", \"position\": [0,0,0],\n\"direction\": [0,0,1]}]}",
        "scene.json:2: ", "means nothing"},
       {"{\"lights\": [{\"kind\": \"spot\", \"position\": [0,0,0], \"direction\": [0,0,1],\n\"inner_angle\": "
-       "60}]}",
+       "60, \"outer_angle\": 59}]}",
        "scene.json:2: ", "wider"},
       {"{\"environment\":\n{\"file\": \"triangle.obj\"}}", "", "triangle.obj"},
   };
@@ -748,7 +749,7 @@ TEST_CASE("files that multiply are refused by their numbers, before anything is 
   const std::string mesh = "{\"meshes\": [" + triangle + "]}";
   std::string forest = "{\"meshes\": [" + triangle + "], \"instances\": [{\"mesh\": \"t\"}";
   for (int i = 0; i < 50; ++i) forest += ",{\"mesh\": \"t\"}";
-  CHECK(chain(forest + "]}", 10, "").find("instances so far; 4194304 are the most") != std::string::npos);
+  CHECK(chain(forest + "]}", 10, "").find("instances so far; 1048677 are the most") != std::string::npos);
   CHECK(chain("{}", 10, "").find("places of files so far; 4194304 are the most") != std::string::npos);
   const std::string ball = "{\"centre\": [0,0,0], \"radius\": 1}";
   CHECK(chain("{\"spheres\": [" + ball + "," + ball + "]}", 10, R"(, "geometry_only": true)")
@@ -760,6 +761,44 @@ TEST_CASE("files that multiply are refused by their numbers, before anything is 
   // as deep, and singular only altogether
   CHECK(chain(mesh, 1, R"(, "transform": [{"scale": 1e-30}])").find("singular") != std::string::npos);
   CHECK(chain(mesh, 2, "").empty());  // 2¹⁵ instances of one mesh
+}
+
+// Catches: a made scene that is made before its size is looked at, or whose refusal names no line.
+TEST_CASE("made scenes are refused by their size, before they are made") {
+  const auto named = [](const std::string& made, const std::string& more = "") {
+    return "{\"include\": [" + more + "\n{\"made\": \"" + made + "\"}]}";
+  };
+  const auto start = std::chrono::steady_clock::now();
+  for (const std::string made :
+       {"terrain:triangles=10000000", "sphereflake:level=7", "sphereflake:level=6", "hall:detail=26",
+        "hall:bays=40,detail=8", "sphereflake:level=7,analytic=1", "hall:textures=2048,detail=1",
+        "torus_knot:segments=20000,sides=250", "sphereflake:subdivisions=7,coarser=0"}) {
+    INFO(made);
+    check_refused(named(made), "scene.json:2: ", "are the most in a scene file");
+    check_refused("{\"meshes\": [\n{\"name\": \"m\",\n\"made\": \"" + made + "\"}]}",
+                  "scene.json:3: ", "are the most in a scene file");
+  }
+  // Those before it count.
+  check_refused(
+      named("torus_knot:segments=20000,sides=100", R"({"name": "a", "made": "terrain:triangles=400000"},)"),
+      "scene.json:2: ", "brings made scenes to 4400000 triangles");
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(10));
+  CHECK(!refusal(named("terrain:triangles=100000", R"({"name": "a", "made": "hall:textures=0"},)")));
+}
+
+// Catches: an angle that is compared with one that the file does not have.
+TEST_CASE("a spot's light ends no nearer than where it is full") {
+  const Folder folder;
+  const auto angles = [&](const std::string& said) {
+    write(folder / "spot.json",
+          R"({"lights": [{"kind": "spot", "position": [0,0,0], "direction": [0,0,1])" + said + "}]}");
+    const Light light = load_scene_file(folder / "spot.json").lights.at(0);
+    return std::pair(light.inner_angle, light.outer_angle);
+  };
+  CHECK(angles("") == std::pair(0.f, 45.f));
+  CHECK(angles(R"(, "inner_angle": 30)") == std::pair(30.f, 45.f));
+  CHECK(angles(R"(, "inner_angle": 60)") == std::pair(60.f, 60.f));
+  CHECK(angles(R"(, "inner_angle": 60, "outer_angle": 70)") == std::pair(60.f, 70.f));
 }
 
 // Catches: a value that takes more memory than its text can pay for.
@@ -787,13 +826,16 @@ TEST_CASE("a model's format is its name's ending") {
   fs::copy(folder / "triangle.obj", folder / "UPPER.OBJ");
   CHECK(load_model(folder / "UPPER.OBJ", {}).triangle_count() == 1);
   CHECK(load_model(folder / "inner.json", {}).spheres.size() == 1);
+  // what it unpacks is the reader's matter
+  write(folder / "triangle.off.gz", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  CHECK(load_model(folder / "triangle.off.gz", {}).triangle_count() == 1);
   for (const std::string name : {"x.txt", "obj", ".gz", "x.json.bak"}) {
     write(folder / name, "{}");
     try {
       load_model(folder / name, {});
       FAIL("taken: " << name);
     } catch (const InputError& error) {
-      CHECK(std::string(error.what()).find(".obj, .ply, .ply.gz, .off, .gltf, .glb and .json") !=
+      CHECK(std::string(error.what()).find(".obj, .ply, .ply.gz, .off, .off.gz, .gltf, .glb and .json") !=
             std::string::npos);
     }
   }

@@ -100,6 +100,15 @@ Scene make(const Parameters& parameters) {
   return scene;
 }
 
+MadeSize size(const Parameters& parameters) {
+  constexpr std::uint64_t walls = 18, block = 10;
+  const std::uint64_t spheres = 2 * static_cast<std::uint64_t>(parameters.whole("spheres"));
+  const bool analytic = parameters.whole("analytic") == 1;
+  std::uint64_t triangles = walls + 2 * block * static_cast<std::uint64_t>(parameters.whole("blocks"));
+  if (!analytic) triangles += spheres * icosphere_triangles(parameters.whole("subdivisions"));
+  return {triangles, triangles, analytic ? spheres : 0, 0};
+}
+
 }  // namespace
 
 MadeScene cornell_box_scene() {
@@ -111,7 +120,8 @@ MadeScene cornell_box_scene() {
        {"light", "the panel gives off light, or a point below it does", 0, 0, 1, true, {"panel", "point"}},
        {"analytic", "spheres as spheres instead of triangles", 0, 0, 1},
        {"subdivisions", "of the spheres' triangles: 20·4^n each", 4, 0, 8}},
-      make};
+      make,
+      size};
 }
 
 }  // namespace trilha

@@ -59,6 +59,9 @@ Scene make(const Parameters& parameters) {
   return scene;
 }
 
+/// The largest of the cases has as many.
+MadeSize size(const Parameters&) { return {5120, 5120, 0, 0}; }
+
 }  // namespace
 
 std::vector<MadeScene> extreme_scenes() {
@@ -68,7 +71,8 @@ std::vector<MadeScene> extreme_scenes() {
   return {{"extreme",
            "the stiff and extreme cases that every structure is tested with: extreme:case=slivers",
            {{"case", "which; by name or number", 0, 0, last, true, std::move(words)}},
-           make}};
+           make,
+           size}};
 }
 
 }  // namespace trilha

@@ -56,6 +56,11 @@ Mesh tube(const std::vector<dvec3>& points, const std::vector<double>& radii, st
 /// normals: as near to equilateral as one ring a latitude allows.
 Mesh counted_sphere(std::uint32_t triangles);
 
+/// How many triangles an icosphere has.
+constexpr std::uint64_t icosphere_triangles(int subdivisions) {
+  return std::uint64_t{20} << 2 * subdivisions;
+}
+
 /// The icosphere with its own normals: those of the sphere.
 Mesh smooth_icosphere(int subdivisions, double scale = 1, const dvec3& centre = dvec3(0));
 

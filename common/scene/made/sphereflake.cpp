@@ -57,6 +57,11 @@ void grow(int levels, const Place& place) {
   }
 }
 
+/// Of the spheres on that level.
+int subdivisions(const Parameters& parameters, int level) {
+  return std::max(parameters.whole("subdivisions") - level * parameters.whole("coarser"), 0);
+}
+
 Scene make(const Parameters& parameters) {
   const int levels = parameters.whole("level");
   Scene scene;
@@ -78,8 +83,7 @@ Scene make(const Parameters& parameters) {
   } else {
     std::size_t count = 2, on_level = 1;  // the floor first
     for (int depth = 0; depth <= levels; ++depth, on_level *= 9) {
-      scene.meshes.push_back(smooth_icosphere(
-          std::max(parameters.whole("subdivisions") - depth * parameters.whole("coarser"), 0)));
+      scene.meshes.push_back(smooth_icosphere(subdivisions(parameters, depth)));
       count += on_level;
     }
     scene.instances.reserve(count);
@@ -97,6 +101,21 @@ Scene make(const Parameters& parameters) {
   return scene;
 }
 
+MadeSize size(const Parameters& parameters) {
+  MadeSize size{2, 2, 0, 0};  // the floor
+  std::uint64_t on_level = 1;
+  for (int level = 0; level <= parameters.whole("level"); ++level, on_level *= 9) {
+    if (parameters.whole("analytic") == 1) {
+      size.bodies += on_level;
+      continue;
+    }
+    const std::uint64_t triangles = icosphere_triangles(subdivisions(parameters, level));
+    size.stored += triangles;
+    size.placed += on_level * triangles;
+  }
+  return size;
+}
+
 }  // namespace
 
 MadeScene sphereflake_scene() {
@@ -106,7 +125,8 @@ MadeScene sphereflake_scene() {
            {"analytic", "spheres as spheres instead of triangles", 0, 0, 1},
            {"subdivisions", "of the largest sphere's triangles: 20·4^n", 4, 0, 7},
            {"coarser", "by how many subdivisions each level is coarser than its parents'", 1, 0, 7}},
-          make};
+          make,
+          size};
 }
 
 }  // namespace trilha

@@ -32,18 +32,19 @@ Mesh stood(Mesh mesh, const glm::dmat3& rotation, double scale, double x, double
 
 enum TeaSetMaterial : std::uint32_t { porcelain, silver, tea, cloth };
 
+constexpr std::uint32_t tea_corners = 48;
+
 /// Pours tea: a disc that hides the hole which Newell left in the bottom of the cup. Its edge lies inside the
 /// wall.
 void fill(Mesh& cup) {
-  constexpr std::uint32_t corners = 48;
   constexpr double height = 0.68, radius = 0.43;  // in the cup's own units; y is up
   const auto centre = static_cast<std::uint32_t>(cup.positions.size());
   cup.materials.assign(cup.triangles.size(), porcelain);
   cup.positions.push_back(dvec3(0, height, 0));
-  for (std::uint32_t i = 0; i < corners; ++i) {
-    const auto [cosine, sine] = turn(360.0 * i / corners);
+  for (std::uint32_t i = 0; i < tea_corners; ++i) {
+    const auto [cosine, sine] = turn(360.0 * i / tea_corners);
     cup.positions.push_back(dvec3(radius * sine, height, radius * cosine));
-    cup.triangles.push_back({centre, centre + 1 + i, centre + 1 + (i + 1) % corners});
+    cup.triangles.push_back({centre, centre + 1 + i, centre + 1 + (i + 1) % tea_corners});
     cup.materials.push_back(tea);
   }
   cup.normals.resize(cup.positions.size(), vec3(0, 1, 0));
@@ -96,13 +97,29 @@ Scene teaset(const Parameters& parameters) {
   return scene;
 }
 
+// Newell's patches are 32, 26 and 16. Where a side of one is a point, each of its quads there is one
+// triangle: so is it eight times in the teapot.
+std::uint64_t teapot_triangles(std::uint64_t quads) { return 64 * quads * quads - 8 * quads; }
+
+MadeSize teapot_size(const Parameters& parameters) {
+  const std::uint64_t triangles = teapot_triangles(static_cast<std::uint64_t>(parameters.whole("quads")));
+  return {triangles, triangles, 0, 0};
+}
+
+MadeSize teaset_size(const Parameters& parameters) {
+  const auto quads = static_cast<std::uint64_t>(parameters.whole("quads"));
+  const std::uint64_t cover = 52 * quads * quads + tea_corners + 32 * quads * quads;
+  const std::uint64_t triangles = 2 + teapot_triangles(quads) + 2 * cover;
+  return {triangles, triangles, 0, 0};
+}
+
 }  // namespace
 
 std::vector<MadeScene> tea_scenes() {
   // At one quad a patch, the two halves of a handle coincide.
   const Parameter quads{"quads", "on a patch's side", 10, 2, 100};
-  return {{"teaset", "Newell's teapot with two cups and two spoons on a cloth", {quads}, teaset},
-          {"teapot", "Newell's teapot alone", {quads}, teapot}};
+  return {{"teaset", "Newell's teapot with two cups and two spoons on a cloth", {quads}, teaset, teaset_size},
+          {"teapot", "Newell's teapot alone", {quads}, teapot, teapot_size}};
 }
 
 }  // namespace trilha

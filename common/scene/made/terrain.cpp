@@ -216,13 +216,19 @@ Scene make(const Parameters& parameters) {
   return scene;
 }
 
+MadeSize size(const Parameters& parameters) {
+  const auto triangles = static_cast<std::uint64_t>(parameters["triangles"]);
+  return {triangles, triangles, 0, 0};
+}
+
 }  // namespace
 
 MadeScene terrain_scene() {
   return {"terrain",
           "a valley with a lake amid mountains, of exactly as many triangles as asked for",
           {{"triangles", "how many", 20000, 2, 1e7}, {"seed", "which landscape", 3, 0, 1e9}},
-          make};
+          make,
+          size};
 }
 
 }  // namespace trilha

@@ -86,6 +86,12 @@ Scene make(const Parameters& parameters) {
   return scene;
 }
 
+MadeSize size(const Parameters& parameters) {
+  const auto whole = [&](const char* name) { return static_cast<std::uint64_t>(parameters.whole(name)); };
+  const std::uint64_t triangles = 2 * whole("segments") * whole("sides");
+  return {triangles, triangles, 0, 0};
+}
+
 }  // namespace
 
 MadeScene torus_knot_scene() {
@@ -96,7 +102,8 @@ MadeScene torus_knot_scene() {
            {"radius", "of the tube; the torus has radii 2 and 1", 0.35, 0.001, 0.9, false},
            {"segments", "along the knot", 600, 60, 20000},
            {"sides", "around the tube", 48, 3, 250}},
-          make};
+          make,
+          size};
 }
 
 }  // namespace trilha

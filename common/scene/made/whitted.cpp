@@ -19,13 +19,14 @@ Material shiny(const char* name, const vec3& diffuse, float reflection) {
   return material;
 }
 
+constexpr std::uint32_t pri_triangles[5] = {194, 274, 348, 482, 606};
+
 /// PRI_I to PRI_V: a sphere and a box, more and more finely.
 Scene pri(const Parameters& parameters) {
-  constexpr std::uint32_t triangles[5] = {194, 274, 348, 482, 606};
   Scene scene;
   scene.name = "pri";
   scene.materials = {shiny("red", {0.75f, 0.16f, 0.10f}, 0.25f), shiny("blue", {0.20f, 0.38f, 0.70f}, 0.15f)};
-  Mesh sphere = counted_sphere(triangles[parameters.whole("number") - 1] - 12);
+  Mesh sphere = counted_sphere(pri_triangles[parameters.whole("number") - 1] - 12);
   sphere.name = "sphere";
   for (vec3& position : sphere.positions) position += vec3(-0.95f, 1, 0.2f);
   Mesh box;
@@ -126,18 +127,31 @@ Scene alexandra(const Parameters&) {
   return scene;
 }
 
+MadeSize pri_size(const Parameters& parameters) {
+  const std::uint64_t triangles = pri_triangles[parameters.whole("number") - 1];
+  return {triangles, triangles, 0, 0};
+}
+MadeSize dist_size(const Parameters&) { return {6 + 1148, 6 + 9 * 1148, 0, 0}; }
+MadeSize alexandra_size(const Parameters&) { return {13 * 12 + 80, 13 * 12 + 80, 0, 0}; }
+
 }  // namespace
 
 std::vector<MadeScene> whitted_scenes() {
   return {{"pri",
            "a sphere and a box of 194, 274, 348, 482 or 606 triangles (Ordeix & Cioli 2010)",
            {{"number", "PRI_I to PRI_V: how finely", 1, 1, 5}},
-           pri},
+           pri,
+           pri_size},
           {"dist",
            "nine elephants, 10 338 triangles in all (Ordeix & Cioli 2010)",
            {{"number", "DIST_I to DIST_III: spread evenly, unevenly, into each other", 1, 1, 3}},
-           dist},
-          {"alexandra", "thirteen boxes and a sphere, 236 triangles (Ordeix & Cioli 2010)", {}, alexandra}};
+           dist,
+           dist_size},
+          {"alexandra",
+           "thirteen boxes and a sphere, 236 triangles (Ordeix & Cioli 2010)",
+           {},
+           alexandra,
+           alexandra_size}};
 }
 
 }  // namespace trilha
