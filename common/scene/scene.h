@@ -155,8 +155,8 @@ Camera framing(const Box& box, const vec3& up);
 /// A camera for the scene: inside it, looking along its longest way across `up` from where the view is free,
 /// where it is a room; else framing() of its bounds. A room is where front faces are what is seen from the
 /// middle in seven of ten directions, or, where something stands in the middle, from halfway to both ends in
-/// nine of ten; but for a shell, like a cup, behind whose two sides there is nothing more. Of scenes with more
-/// than 2²⁰ triangles, some are looked at, evenly.
+/// nine of ten; but for a shell, like a cup, behind whose two sides there is nothing more. Of scenes with
+/// more than 2²⁰ triangles, some are looked at, evenly.
 Camera framing(const Scene& scene, const vec3& up);
 
 /// The camera for an image of that aspect (width over height): where that is higher than wide, the field of
@@ -171,8 +171,8 @@ SceneFeatures features_of(const Scene& scene);
 void finish(Scene& scene, const vec3& up, bool camera_known);
 
 /// The scene of that name ("bunny", "teaset", …), made with parameters ("hall:detail=4,angle=30"), or in that
-/// file (.obj, .ply, .ply.gz, .off, .gltf, .glb, .json). An empty name asks for the default: the bunny if it
-/// has been fetched, else the shipped tea set, with a warning. Throws InputError.
+/// file (.obj, .ply, .ply.gz, .off, .off.gz, .gltf, .glb, .json). An empty name asks for the default: the
+/// bunny if it has been fetched, else the shipped tea set, with a warning. Throws InputError.
 Scene load_scene(const std::string& name_or_file, const LoadOptions& options = {});
 
 }  // namespace trilha
