@@ -40,8 +40,7 @@ class NearestByte {
  public:
   NearestByte() {
     for (std::size_t i = 0; i < 255; ++i) {
-      const double encoded = (static_cast<double>(i) + 0.5) / 255;
-      const double light = encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+      const double light = srgb_decoded_double((static_cast<double>(i) + 0.5) / 255);
       borders_[i] = static_cast<float>(light);
       if (borders_[i] < light) borders_[i] = std::nextafter(borders_[i], 1.0f);  // the same floats lie below
     }

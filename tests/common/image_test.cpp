@@ -146,6 +146,39 @@ TEST_CASE("colours are encoded as sRGB says") {
   CHECK(srgb_encoded(std::nanf("")) == 0);
 }
 
+// Catches: the C library's pow, whose last bits differ between machines; a float that is not the nearest; one
+// that is so near to the middle between two that a machine could take the other.
+TEST_CASE("colours are decoded to the nearest float, and none is in doubt") {
+  const auto wanted = [](double display) {
+    const long double x = display;
+    return display <= 0.04045 ? x / 12.92L : std::pow((x + 0.055L) / 1.055L, 2.4L);
+  };
+  std::size_t wrong = 0;
+  long double worst = 0, nearest_border = 1;
+  const auto check = [&](double display) {
+    const long double light = wanted(display);
+    const auto error = std::fabs(srgb_decoded_double(display) - light);
+    if (light > 0) worst = std::max(worst, error / light);
+    const auto rounded = static_cast<float>(light);
+    for (const float end : {0.0f, 2.0f}) {
+      const long double border = (rounded + static_cast<long double>(std::nextafter(rounded, end))) / 2;
+      if (light > 0) nearest_border = std::min(nearest_border, std::fabs(light - border) / light);
+    }
+    return rounded;
+  };
+  for (const int most : {255, 65535})
+    for (int i = 0; i <= most; ++i) {
+      const float display = static_cast<float>(i) / static_cast<float>(most);
+      wrong += srgb_decoded(display) != check(double(display));
+    }
+  for (int i = 0; i < 255; ++i) check((i + 0.5) / 255);  // the borders between bytes
+  CHECK(wrong == 0);
+  CHECK(double(worst) < 1e-15);
+  CHECK(double(nearest_border) > 1e-14);
+  CHECK((srgb_decoded(0) == 0 && srgb_decoded(1) == 1 && srgb_decoded(7) == 1 && srgb_decoded(-1) == 0));
+  CHECK(srgb_decoded(nan_value) == 0);
+}
+
 // Catches: a conversion that is applied twice, or the wrong way.
 TEST_CASE("images become light and display values, and stay what they are") {
   const Image light = uniform(1, 1, {0.214041f, 2, -1}, Encoding::light);
