@@ -1173,11 +1173,7 @@ void Loader::read_surroundings(const Surroundings& from) {
     ++scene.images_not_read;
     return;
   }
-  Image image = read_image(from.file);
-  if (image.encoding != Encoding::light)
-    refuse(from.path, from.line,
-           in_quotes(from.environment.file) +
-               " holds colours for a screen; an environment is light: .hdr or .exr");
+  Image image = read_environment(from.file);
   // Infinity and NaN would spread over the picture, and there is no negative light.
   float brightest = 0;
   for (const vec3& pixel : image.pixels)
