@@ -63,7 +63,6 @@ constexpr std::uint64_t most_bodies = 1u << 22;  // spheres and planes
 constexpr std::uint64_t most_lights = 1u << 16;
 constexpr std::uint64_t most_views = 10000;
 constexpr std::uint64_t most_made_triangles = 1u << 24;
-constexpr std::uint64_t most_texels = 1u << 28;
 constexpr double largest = std::numeric_limits<float>::max();
 constexpr double smallest = std::numeric_limits<float>::min();
 
@@ -965,14 +964,7 @@ const Node* Loader::model(Scene from, const std::string& path) {
   const auto first_texture = static_cast<std::int32_t>(scene.textures.size());
   for (Texture& texture : from.textures) scene.textures.push_back(std::move(texture));
   scene.images_not_read += from.images_not_read;
-  std::uint64_t texels = 0;
-  for (const Texture& texture : scene.textures)
-    if (!texture.levels.empty())
-      texels += std::uint64_t(texture.levels[0].width) * std::uint64_t(texture.levels[0].height);
-  if (texels > most_texels)
-    refuse(path, 0,
-           "brings the textures to " + std::to_string(texels) + " texels; " + std::to_string(most_texels) +
-               " are the most in a scene");
+  textures_.check_bytes(path, 0);
   for (Material& material : from.materials) {
     for (Map* map :
          {&material.diffuse_map, &material.specular_map, &material.emission_map, &material.normal_map,
