@@ -92,18 +92,35 @@ std::string exr_bytes(const Image& light) {
   return bytes;
 }
 
+/// What an image may be.
+struct Limits {
+  long long pixels;
+  long long pixels_a_byte;  ///< of its file, beyond 2²⁰
+  bool light;               ///< and nothing else
+};
+
 /// Takes the colours of an image, and none that is larger than the limits.
 class Colours : public ImageSink {
  public:
-  explicit Colours(std::string path) : path_(std::move(path)) {}
+  Colours(std::string path, const Limits& limits) : path_(std::move(path)), limits_(limits) {}
 
   void begin(const ImageHeader& header) override {
     const long long width = header.width, height = header.height;
-    if (width < 1 || height < 1 || width > most_side || height > most_side || width * height > most_pixels)
-      throw InputError(path_ + ": cannot be read: an image of " + std::to_string(width) + "x" +
-                       std::to_string(height) + " pixels is refused; each side goes from 1 to " +
-                       std::to_string(most_side) + ", both together to " + std::to_string(most_pixels) +
-                       " pixels");
+    const auto refuse = [&](const std::string& what) {
+      throw InputError(path_ + ": cannot be read: " + what);
+    };
+    if (limits_.light && header.encoding != Encoding::light)
+      refuse("it holds colours for a screen; an environment is light: name a .hdr or .exr file");
+    const std::string size =
+        "an image of " + std::to_string(width) + "x" + std::to_string(height) + " pixels";
+    if (width < 1 || height < 1 || width > most_side || height > most_side || width * height > limits_.pixels)
+      refuse(size + " is refused; each side goes from 1 to " + std::to_string(most_side) +
+             ", both together to " + std::to_string(limits_.pixels) + " pixels");
+    const auto file_bytes = static_cast<long long>(header.file_bytes);
+    const long long most = (1ll << 20) + limits_.pixels_a_byte * file_bytes;
+    if (width * height > most)
+      refuse(size + " from " + std::to_string(file_bytes) + " bytes is refused; " + std::to_string(most) +
+             " pixels are the most that such a file may have");
     image = {static_cast<int>(width), static_cast<int>(height), header.encoding, {}};
   }
   void row(const u8vec4* texels) override { append(texels, 255.0f); }
@@ -122,7 +139,14 @@ class Colours : public ImageSink {
   }
 
   std::string path_;
+  Limits limits_;
 };
+
+Image read(const std::string& path, const Limits& limits) {
+  Colours colours(path, limits);
+  decode(path + ":", image_bytes(path), colours);
+  return std::move(colours.image);
+}
 
 }  // namespace
 
@@ -161,9 +185,11 @@ void write_image(const std::string& path, const Image& image) {
 }
 
 Image read_image(const std::string& path) {
-  Colours colours(path);
-  decode(path + ":", image_bytes(path), colours);
-  return std::move(colours.image);
+  return read(path, {.pixels = most_pixels, .pixels_a_byte = 1024, .light = false});
+}
+
+Image read_environment(const std::string& path) {
+  return read(path, {.pixels = 1ll << 26, .pixels_a_byte = 256, .light = true});
 }
 
 }  // namespace trilha

@@ -24,8 +24,13 @@ void write_image(const std::string& path, const Image& image);
 /// values in [0, 1]; Radiance HDR (RGBE, rows from the top; its EXPOSURE is not applied) and OpenEXR (the
 /// data window of R, G, B or of Y alone, first part) become light, NaN and infinity kept. Grey becomes three
 /// equal channels, alpha is ignored. Throws InputError: no such file, a directory, cut short, no image,
-/// larger than the limits above, which the header is asked for before anything is decoded. The file itself
-/// has at most 2 GiB.
+/// larger than the limits above, or with more pixels than 2²⁰ + 1024·n of a file of n bytes (what deflate can
+/// make of them, a byte a pixel): a pixel takes 12 bytes. The header is asked for all of this before anything
+/// is decoded. The file itself has at most 2 GiB.
 Image read_image(const std::string& path);
+
+/// The same for the image around a scene: light, so that a PNG or JPEG is refused by its header, of at most
+/// 2²⁶ pixels and 2²⁰ + 256·n of a file of n bytes. One colour in three halves, as ZIP packs it, passes.
+Image read_environment(const std::string& path);
 
 }  // namespace trilha

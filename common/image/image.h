@@ -20,8 +20,11 @@ struct Image {
 
 /// The sRGB transfer function (IEC 61966-2-1) of one channel; the argument is clamped to [0, 1], NaN is 0.
 float srgb_encoded(float light);
-/// Its inverse.
+/// Its inverse, the same bits on every machine: the double below, rounded once.
 float srgb_decoded(float display);
+/// The same in double, of 0 to 1, to 1e-15 of its value; from +, −, × and ÷ alone, which IEEE 754 rounds
+/// alike everywhere, where the C library's pow may differ.
+double srgb_decoded_double(double display);
 
 /// The image as light: display values are clamped to [0, 1] and decoded, light stays as it is.
 Image as_light(Image image);

@@ -213,7 +213,7 @@ Scene under_sky(const fs::path& file, const LoadOptions& options) {
   }
   scene.environment.colour = vec3(1);
   scene.environment.file = file.filename().string();
-  if (options.environment) scene.environment.image = as_light(read_image(file.string()));
+  if (options.environment) scene.environment.image = as_light(read_environment(file.string()));
   scene.camera = {{0, 3.8f, 10}, {0, 0.7f, 0}, {0, 1, 0}, 32};
   finish(scene, {0, 1, 0}, true);
   return scene;
@@ -234,7 +234,7 @@ Scene load_entry(const SceneEntry& entry, LoadOptions options) {
     scene.camera.target = box.centre();
     scene.camera.eye =
         box.centre() + portrait->distance * glm::length(box.size()) * glm::normalize(portrait->towards_eye);
-  } else if (!entry.collection.empty()) {
+  } else if (!entry.collection.empty() && entry.file.extension() != ".exr") {
     scene.camera =
         framing(bounds(scene), vec3(0, 1, 0));  // things, not rooms: a cupboard is no place to stand in
   }

@@ -65,7 +65,6 @@ constexpr std::uint64_t most_views = 10000;
 constexpr std::uint64_t most_multiplied = 1u << 20;      // instances beyond those that files write out
 constexpr std::uint64_t most_made_triangles = 1u << 22;  // stored, and placed
 constexpr std::uint64_t most_made_texels = 1u << 25;
-constexpr std::uint64_t most_texels = 1u << 28;
 constexpr double largest = std::numeric_limits<float>::max();
 constexpr double smallest = std::numeric_limits<float>::min();
 
@@ -984,14 +983,7 @@ const Node* Loader::model(Scene from, const std::string& path, std::size_t line)
   const auto first_texture = static_cast<std::int32_t>(scene.textures.size());
   for (Texture& texture : from.textures) scene.textures.push_back(std::move(texture));
   scene.images_not_read += from.images_not_read;
-  std::uint64_t texels = 0;
-  for (const Texture& texture : scene.textures)
-    if (!texture.levels.empty())
-      texels += std::uint64_t(texture.levels[0].width) * std::uint64_t(texture.levels[0].height);
-  if (texels > most_texels)
-    refuse(path, 0,
-           "brings the textures to " + std::to_string(texels) + " texels; " + std::to_string(most_texels) +
-               " are the most in a scene");
+  textures_.check_bytes(path, 0);
   for (Material& material : from.materials) {
     for (Map* map :
          {&material.diffuse_map, &material.specular_map, &material.emission_map, &material.normal_map,
@@ -1193,11 +1185,7 @@ void Loader::read_surroundings(const Surroundings& from) {
     ++scene.images_not_read;
     return;
   }
-  Image image = read_image(from.file);
-  if (image.encoding != Encoding::light)
-    refuse(from.path, from.line,
-           in_quotes(from.environment.file) +
-               " holds colours for a screen; an environment is light: .hdr or .exr");
+  Image image = read_environment(from.file);
   // Infinity and NaN would spread over the picture, and there is no negative light.
   float brightest = 0;
   for (const vec3& pixel : image.pixels)

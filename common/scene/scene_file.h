@@ -15,8 +15,8 @@ namespace trilha {
 /// nothing, transforms that are singular, files outside the folder (LoadOptions), includes that come back to
 /// themselves. Limits, all said before memory is taken: 16 files deep, 1000 files, 2²² instances, and where
 /// files multiply them 2²⁰ more than the files write out; 2²² spheres and planes, 2¹⁶ lights, 10 000 views,
-/// 2²⁸ texels; of made scenes, each counted once, by its MadeSize, 2²² triangles stored and as many placed,
-/// and 2²⁵ texels.
+/// the textures that texture.h allows; of made scenes, each counted once, by its MadeSize, 2²² triangles
+/// stored and as many placed, and 2²⁵ texels.
 Scene load_scene_file(const std::string& path, const LoadOptions& options = {});
 
 /// The scene or model in a file, by the ending of its name: what scene files include. Throws InputError.

@@ -18,8 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr long long most_side = 16384, most_texels = 1ll << 26, most_texels_of_scene = 1ll << 28;
-constexpr float most_light = 1e30f;  // where sums and quotients are still far from infinity
+constexpr long long most_side = 16384, most_texels = 1ll << 26;
+constexpr std::uint64_t most_bytes = 2ull << 30, most_bytes_of_nothing = 320ull << 20, most_ratio = 1024;
+constexpr std::size_t most_named = 8;  // images that are missing
+constexpr float most_light = 1e30f;    // where sums and quotients are still far from infinity
 
 // ---- bytes and numbers ----
 
@@ -40,8 +42,7 @@ class NearestByte {
  public:
   NearestByte() {
     for (std::size_t i = 0; i < 255; ++i) {
-      const double encoded = (static_cast<double>(i) + 0.5) / 255;
-      const double light = encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+      const double light = srgb_decoded_double((static_cast<double>(i) + 0.5) / 255);
       borders_[i] = static_cast<float>(light);
       if (borders_[i] < light) borders_[i] = std::nextafter(borders_[i], 1.0f);  // the same floats lie below
     }
@@ -192,16 +193,30 @@ void add_levels(Texture& texture) {
 
 // ---- images ----
 
-[[noreturn]] void refuse_as_too_many(const std::string& label) {
-  throw InputError(label + " cannot be read: with it the textures of the scene would have more than " +
-                   std::to_string(most_texels_of_scene) + " texels; name fewer or smaller images");
+/// What the levels take, also where they are not filled in.
+std::uint64_t bytes_of(const Texture& texture) {
+  std::uint64_t texels = 0;
+  for (const TextureLevel& level : texture.levels) texels += area(level.width, level.height);
+  return texels * (texture.levels.empty() || texture.levels[0].floats.empty() ? 4 : 16);
+}
+
+/// What a texture of that size takes with its chain.
+std::uint64_t bytes_of_chain(long long width, long long height, std::uint64_t bytes_a_texel) {
+  std::uint64_t texels = 0;
+  for (; width > 1 || height > 1; width = std::max(1ll, width / 2), height = std::max(1ll, height / 2))
+    texels += static_cast<std::uint64_t>(width * height);
+  return (texels + 1) * bytes_a_texel;
+}
+
+std::string in_mebibytes(std::uint64_t bytes) {
+  return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MiB";
 }
 
 /// Takes an image as the largest level of a texture, within the limits.
 class Texels : public ImageSink {
  public:
-  Texels(const std::string& label, Texture& texture, long long texels_so_far)
-      : label_(label), texture_(texture), texels_so_far_(texels_so_far) {}
+  Texels(const std::string& label, Texture& texture, const std::function<void(std::uint64_t)>& check_bytes)
+      : label_(label), texture_(texture), check_bytes_(check_bytes) {}
 
   void begin(const ImageHeader& header) override {
     check(header);
@@ -268,12 +283,12 @@ class Texels : public ImageSink {
     if (!within(most))
       refuse("a texture of " + size + " texels from " + std::to_string(file_bytes) + " bytes is refused; " +
              std::to_string(most) + " texels are the most that such a file may have");
-    if (!within(most_texels_of_scene - texels_so_far_)) refuse_as_too_many(label_);
+    check_bytes_(bytes_of_chain(header.width, header.height, static_cast<std::uint64_t>(bytes_a_texel)));
   }
 
   const std::string& label_;
   Texture& texture_;
-  const long long texels_so_far_;
+  const std::function<void(std::uint64_t)>& check_bytes_;
   bool colour_ = false, to_straight_ = false;
 };
 
@@ -282,15 +297,15 @@ bool not_opaque(const TextureLevel& level) {
          std::any_of(level.floats.begin(), level.floats.end(), [](const vec4& t) { return t.w != 1; });
 }
 
-long long texels_of(const Texture& texture) {
-  return static_cast<long long>(area(texture.levels[0].width, texture.levels[0].height));
-}
-
-/// The texture in those bytes, with its chain.
-Texture decoded(const std::string& label, std::string_view bytes, TextureUse use, long long texels_so_far) {
+/// The texture in those bytes, with its chain. `check` is asked whether there may be so many bytes of it.
+Texture decoded(const std::string& label, std::string_view bytes, TextureUse use,
+                const std::function<void(std::uint64_t, const Texture&)>& check) {
   Texture texture;
   texture.use = use;
-  Texels texels(label, texture, texels_so_far);
+  texture.file_bytes = bytes.size();
+  texture.file_hash = std::hash<std::string_view>()(bytes);
+  const std::function<void(std::uint64_t)> check_bytes = [&](std::uint64_t more) { check(more, texture); };
+  Texels texels(label, texture, check_bytes);
   decode(label, bytes, texels);
   texture.has_alpha = not_opaque(texture.levels[0]);
   add_levels(texture);
@@ -343,9 +358,49 @@ Texture make_texture(std::string name, int width, int height, std::vector<u8vec4
   return texture;
 }
 
-long long TextureSet::texels_so_far() {
-  for (; counted_ < scene_.textures.size(); ++counted_) texels_ += texels_of(scene_.textures[counted_]);
-  return texels_;
+void TextureSet::check_bytes(const std::string& what, std::uint64_t more, const Texture& of) {
+  for (; counted_ < scene_.textures.size(); ++counted_) {
+    const Texture& texture = scene_.textures[counted_];
+    const std::uint64_t bytes = bytes_of(texture);
+    bytes_.all += bytes;
+    if (texture.file_bytes == 0) continue;
+    bytes_.from_files += bytes;
+    if (bytes_.files.emplace(texture.file_bytes, texture.file_hash).second)
+      bytes_.of_files += texture.file_bytes;
+  }
+  if (bytes_.all + more > most_bytes)
+    throw InputError(what + " the textures of the scene would take " + in_mebibytes(bytes_.all + more) +
+                     "; " + in_mebibytes(most_bytes) + " are the most; name fewer or smaller images");
+  const std::uint64_t from_files = bytes_.from_files + (of.file_bytes > 0 ? more : 0);
+  const bool is_new = !bytes_.files.contains({of.file_bytes, of.file_hash});
+  const std::uint64_t of_files = bytes_.of_files + (is_new ? of.file_bytes : 0);
+  const std::uint64_t most = most_bytes_of_nothing + most_ratio * of_files;
+  if (from_files > most)
+    throw InputError(what + " the textures of the scene would take " + in_mebibytes(from_files) + " from " +
+                     std::to_string(of_files) + " bytes of images; " + in_mebibytes(most) +
+                     " are the most for these; name fewer or smaller images");
+}
+
+void TextureSet::check_bytes(const std::string& path, std::size_t line) {
+  check_bytes(printable(path) + (line == 0 ? "" : ":" + std::to_string(line)) + ": with what it brings", 0,
+              {});
+}
+
+void TextureSet::warn_of_missing(const std::string& image, const std::string& text) {
+  if (!missing_.insert(image).second) return;
+  if (missing_.size() <= most_named) {
+    scene_.warnings.push_back(text + " not found; magenta and black squares stand for it");
+    return;
+  }
+  // Others may have added to the warnings since, and taken them elsewhere.
+  std::vector<std::string>& warnings = scene_.warnings;
+  const bool is_there = missing_.size() > most_named + 1 && many_missing_at_ < warnings.size() &&
+                        warnings[many_missing_at_] == many_missing_;
+  if (is_there) warnings.erase(warnings.begin() + static_cast<std::ptrdiff_t>(many_missing_at_));
+  const std::size_t more = missing_.size() - most_named;
+  many_missing_ = "and " + std::to_string(more) + (more == 1 ? " more image" : " more images") + " not found";
+  many_missing_at_ = warnings.size();
+  warnings.push_back(many_missing_);
 }
 
 std::int32_t TextureSet::number(const std::string& image, const std::string& label, const How& how,
@@ -358,8 +413,9 @@ std::int32_t TextureSet::number(const std::string& image, const std::string& lab
   if (const auto same = numbers_.find(key); same != numbers_.end()) return same->second;
   Texture texture;
   if (is_decoded) {  // and differs in what lies beyond its edges alone
-    texture = scene_.textures[static_cast<std::size_t>(found->second)];
-    if (texels_so_far() + texels_of(texture) > most_texels_of_scene) refuse_as_too_many(label);
+    const Texture& same = scene_.textures[static_cast<std::size_t>(found->second)];
+    check_bytes(label + " cannot be read: with it", bytes_of(same), same);
+    texture = same;
   } else {
     texture = make();
   }
@@ -380,6 +436,9 @@ std::int32_t TextureSet::add(const fs::path& file, const How& how, const std::st
                              std::size_t line) {
   if (!options_.textures) return left_out(file.string());
   const std::string label = printable(file.string()) + ":";
+  const auto check = [&](std::uint64_t more, const Texture& of) {
+    check_bytes(label + " cannot be read: with it", more, of);
+  };
   std::error_code error;
   fs::path whole = fs::weakly_canonical(file, error);
   if (error) whole = file.lexically_normal();
@@ -387,16 +446,13 @@ std::int32_t TextureSet::add(const fs::path& file, const How& how, const std::st
   return number(image, label, how, [&] {
     const fs::file_status status = fs::status(file, error);
     const bool missing = status.type() == fs::file_type::not_found;
-    if (missing && !missing_.contains(image)) {
-      missing_.insert(image);
-      scene_.warnings.push_back(printable(path) + (line == 0 ? "" : ":" + std::to_string(line)) + ": " +
-                                in_quotes(file.filename().string()) +
-                                " not found; magenta and black squares stand for it");
-    }
+    if (missing)
+      warn_of_missing(image, printable(path) + (line == 0 ? "" : ":" + std::to_string(line)) + ": " +
+                                 in_quotes(file.filename().string()));
     if (!missing && fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status))
       throw InputError(label + " cannot be read: it is not a regular file; save the image to one");
-    Texture texture = missing ? missing_texture(how.use)
-                              : decoded(label, image_bytes(file.string()), how.use, texels_so_far());
+    Texture texture =
+        missing ? missing_texture(how.use) : decoded(label, image_bytes(file.string()), how.use, check);
     texture.name = file.filename().string();
     return texture;
   });
@@ -407,8 +463,11 @@ std::int32_t TextureSet::add(const std::string& name, std::string_view encoded, 
   if (!options_.textures) return left_out(name);
   const std::string label =
       printable(path) + (line == 0 ? "" : ":" + std::to_string(line)) + ": image " + in_quotes(name);
+  const auto check = [&](std::uint64_t more, const Texture& of) {
+    check_bytes(label + " cannot be read: with it", more, of);
+  };
   return number(path + '\0' + '#' + name, label, how, [&] {
-    Texture texture = decoded(label, encoded, how.use, texels_so_far());
+    Texture texture = decoded(label, encoded, how.use, check);
     texture.name = name;
     return texture;
   });

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "common/math/vector.h"
@@ -37,8 +38,10 @@ struct Texture {
   std::string name;  ///< its file, for people
   TextureUse use = TextureUse::colour;
   Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
-  bool has_alpha = false;  ///< a texel is not opaque
-  bool missing = false;    ///< its file could not be found: magenta and black squares
+  bool has_alpha = false;      ///< a texel is not opaque
+  bool missing = false;        ///< its file could not be found: magenta and black squares
+  std::size_t file_bytes = 0;  ///< of the image that it was decoded from; 0: it was made
+  std::size_t file_hash = 0;   ///< of those bytes: textures of the same image have the same
   /// Largest first; each half as wide and high as the one before, rounded down, at least 1; the last is 1×1.
   /// A texel is the mean of the area that it covers of the level before, texels that it covers in part
   /// counting by that part, so that the last is the mean of all; in linear light where the texture holds
@@ -71,13 +74,19 @@ class TextureSet {
 
   /// The number in Scene::textures of the image in that file, which line `line` of the file `path` names (0:
   /// no line applies); −1 where textures are not wanted (Scene::images_not_read counts them). A file that
-  /// does not exist becomes the magenta texture, with one warning. Throws InputError, "FILE: cannot be read:
-  /// …", where decode() does, where the file is a folder, no regular file or may not be read, or holds
-  /// numbers that are not finite.
+  /// does not exist becomes the magenta texture, with a warning; eight are named, the last warning counts the
+  /// others. Throws InputError, "FILE: cannot be read: …", where decode() does, where the file is a folder,
+  /// no regular file or may not be read, or holds numbers that are not finite.
   ///
   /// Limits, asked of the header: sides of 16384, 2²⁶ texels; a file of n bytes has at most 2²⁰ + 1024·n
-  /// texels of bytes, or a quarter as many of floats: what deflate can make of n bytes, so that a PNG of one
-  /// colour passes and a file of a kilobyte cannot ask for more than 8 MB; 2²⁸ texels in all of a scene.
+  /// texels of bytes (four bytes each), or a quarter as many of floats (16 bytes each): what deflate can make
+  /// of n bytes, so that a PNG of one colour passes and a file of a kilobyte cannot ask for more than 8 MiB,
+  /// 11 with its mip levels.
+  ///
+  /// The textures of a scene, with all levels and with the copies for other uses and wraps, take at most
+  /// 2 GiB; those that come from files, of n bytes together, at most 320 MiB + 1024·n bytes, equal images
+  /// counting once in n: a white PNG of 8192×8192 passes, and small files cannot add up to gigabytes. While
+  /// an image becomes a texture it takes up to three times as much.
   std::int32_t add(const std::filesystem::path& file, const How& how, const std::string& path,
                    std::size_t line);
 
@@ -86,19 +95,31 @@ class TextureSet {
   std::int32_t add(const std::string& name, std::string_view encoded, const How& how, const std::string& path,
                    std::size_t line);
 
+  /// Throws InputError, "PATH:LINE: …", where the textures of the scene, from wherever they came into it, are
+  /// beyond the limits that it has for all of them.
+  void check_bytes(const std::string& path, std::size_t line);
+
  private:
   std::int32_t number(const std::string& image, const std::string& label, const How& how,
                       const std::function<Texture()>& make);
   std::int32_t left_out(const std::string& image);
-  long long texels_so_far();  // of the scene, in the largest levels
+  void check_bytes(const std::string& what, std::uint64_t more, const Texture& of);
+  void warn_of_missing(const std::string& image, const std::string& text);
 
   Scene& scene_;
   const LoadOptions& options_;
   std::map<std::string, std::int32_t> numbers_;  // by image, use and wraps
   std::set<std::string> left_out_;
   std::set<std::string> missing_;  // images that a warning was given for
-  std::size_t counted_ = 0;        // textures of the scene in texels_
-  long long texels_ = 0;
+  std::string many_missing_;       // the warning that counts those beyond the first
+  std::size_t many_missing_at_ = 0;
+
+  struct Bytes {
+    std::uint64_t all = 0, from_files = 0, of_files = 0;
+    std::set<std::pair<std::size_t, std::size_t>> files;  // by size and hash
+  };
+  Bytes bytes_;              // of the first textures of the scene,
+  std::size_t counted_ = 0;  // so many
 };
 
 }  // namespace trilha

@@ -429,6 +429,14 @@ TEST_CASE("a file that is not there is magenta and black, and said once") {
   CHECK(set.scene.textures.size() == 2);
   set.add(folder / "nor/this.png");
   CHECK(set.scene.warnings.size() == 2);
+  for (int i = 3; i <= 100; ++i) {
+    set.add(folder / (std::to_string(i) + ".png"));
+    if (i == 50) set.scene.warnings.push_back("another's");
+  }
+  REQUIRE(set.scene.warnings.size() == 10);
+  CHECK(set.scene.warnings[7].find("'8.png' not found; magenta") != std::string::npos);
+  CHECK(set.scene.warnings[8] == "another's");
+  CHECK(set.scene.warnings[9] == "and 92 more images not found");
 }
 
 // Catches: a pipe that is waited for, a folder taken for a missing file, a refusal of several lines.
@@ -483,21 +491,111 @@ TEST_CASE("no file asks for more than its bytes can hold") {
     INFO(white.size() << " bytes");
     CHECK(mean(set.from(white)) == vec4(1));
   }
+  // a white one of 8192×8192, as small as deflate makes it, passes
+  CHECK(claims(8192, 8192, 8, 0, 65100).find("are the most") == std::string::npos);
+}
 
-  Texture large;  // as if it had been read
-  large.levels.push_back({16384, 4096, {}, {}});
-  const std::string small = png(64, 64, 1, 0, std::vector<std::string>(64, std::string(8, '\1')));
+/// As if it had been read from a file of that size, or made.
+Texture of_size(int width, int height, std::size_t file_bytes, std::size_t hash) {
+  Texture texture;
+  texture.levels.push_back({width, height, {}, {}});
+  texture.file_bytes = file_bytes;
+  texture.file_hash = hash;
+  return texture;
+}
+
+// Catches: an allowance that small files, copies or equal files add up to gigabytes; levels that are not
+// counted; what is made refused because no file stands for it.
+TEST_CASE("the textures of a scene take no more than its files are good for") {
+  const auto words = [](Set& set) { return refusal([&] { set.set.check_bytes("scene.json", 7); }); };
+  Set made;  // of 2 GiB
+  for (std::size_t i = 0; i < 8; ++i) made.scene.textures.push_back(of_size(16384, 4096, 0, 0));
+  CHECK(words(made).empty());
+  made.scene.textures.push_back(of_size(1, 1, 0, 0));
+  CHECK(words(made) ==
+        "scene.json:7: with what it brings the textures of the scene would take 2049 MiB; 2048 MiB are the "
+        "most; name fewer or smaller images");
+
+  for (const bool equal : {false, true}) {  // 8 MiB each of 1 kB: n of them may take 320 + n MiB, or 321
+    Set set;
+    for (std::size_t i = 0; i < (equal ? 40u : 45u); ++i)
+      set.scene.textures.push_back(of_size(2048, 1024, 1024, equal ? 5 : i));
+    set.scene.textures.push_back(of_size(8192, 4096, 0, 0));  // made
+    CHECK(words(set).empty());
+    set.scene.textures.push_back(of_size(2048, 1024, 1024, 5));
+    CHECK(words(set).find("bytes of images; ") != std::string::npos);
+  }
+
+  const auto flat = [](int value) {  // 16 bits: 11 MB of 1 kB
+    return png(1024, 512, 16, 0, std::vector<std::string>(512, std::string(2048, static_cast<char>(value))));
+  };
   Set full;
-  full.scene.textures.assign(4, large);
-  CHECK(refusal([&] { full.from(small); }).find("more than 268435456 texels") != std::string::npos);
-  Set nearly;
-  nearly.scene.textures.assign(4, large);
-  nearly.scene.textures[3].levels[0].width -= 1;
-  CHECK(nearly.set.add("small", small, {}, "scene.glb", 0) == 4);
-  CHECK(nearly.set.add("small", small, {}, "scene.glb", 0) == 4);
-  const TextureSet::How other{TextureUse::colour, Wrap::clamp, Wrap::clamp};
-  const std::string text = refusal([&] { nearly.set.add("small", small, other, "scene.glb", 0); });
-  CHECK(text.find("more than 268435456 texels") != std::string::npos);
+  full.scene.textures.push_back(of_size(16384, 5110, 1, 1));  // 648 KiB are left
+  const std::string refused = refusal([&] { full.from(flat(0)); });
+  CHECK(
+      refused.find("image '1' cannot be read: with it the textures of the scene would take 331 MiB from ") !=
+      std::string::npos);
+  const std::string small = png(256, 256, 8, 0, std::vector<std::string>(256, std::string(256, '\1')));
+  const auto add = [&](Wrap wrap) {
+    return full.set.add("small", small, {TextureUse::colour, wrap, wrap}, "scene.glb", 0);
+  };
+  CHECK((add(Wrap::repeat) == 1 && add(Wrap::clamp) == 2));  // 341 KiB each, and some for their file
+  const std::string copy = refusal([&] {
+    for (const Wrap wrap : {Wrap::mirror, Wrap::repeat})
+      full.set.add("small", small, {TextureUse::colour, wrap, Wrap::clamp}, "scene.glb", 0);
+  });
+  CHECK(copy.find("image 'small' cannot be read: with it the textures") != std::string::npos);
+
+  // and over the models of a scene
+  Folder folder;
+  const int count = 18;
+  for (int model = 0; model < 2; ++model) {
+    std::string materials,
+        faces = "mtllib " + std::to_string(model) + ".mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n";
+    for (int i = 0; i < count; ++i) {
+      const std::string number = std::to_string(model * count + i);
+      write(folder / (number + ".png"), flat(model * count + i));
+      materials += "newmtl " + number + "\nmap_Kd " + number + ".png\n";
+      faces += "usemtl " + number + "\nf 1/1 2/1 3/1\n";
+    }
+    write(folder / (std::to_string(model) + ".mtl"), materials);
+    write(folder / (std::to_string(model) + ".obj"), faces);
+  }
+  CHECK_NOTHROW(load_scene(folder / "0.obj"));
+  write(folder / "scene.json", R"({"include": [{"file": "0.obj"}, {"file": "1.obj"}]})");
+  const std::string together = refusal([&] { load_scene(folder / "scene.json"); });
+  CHECK(together.rfind(folder / "1.obj: with what it brings the textures of the scene would take ", 0) == 0);
+}
+
+// Catches: an image decoded in gigabytes before it is said that it is no light; light that a small file may
+// have without end.
+TEST_CASE("an image around a scene is refused by its header") {
+  Folder folder;
+  const auto words = [&](const std::string& name) {
+    write(folder / "scene.json", R"({"environment": {"file": ")" + name + R"("}})");
+    return refusal([&] { load_scene(folder / "scene.json"); });
+  };
+  std::string bits = png_header(32768, 8192, 1, 0);
+  bits.resize(32689);
+  write(folder / "bits.png", bits);  // whose data, were it asked for, would be said to be cut short
+  CHECK(words("bits.png") == folder /
+                                 "bits.png: cannot be read: it holds colours for a screen; an environment is "
+                                 "light: name a .hdr or .exr file");
+  write(folder / "photo.jpg", jpeg({16, 16, Encoding::display, std::vector<vec3>(256, vec3(0.5f))}));
+  CHECK(words("photo.jpg").find("colours for a screen") != std::string::npos);
+  const auto hdr = [&](int width, int height, std::size_t size) {
+    std::string bytes = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y " + std::to_string(height) + " +X " +
+                        std::to_string(width) + "\n";
+    bytes.resize(std::max(size, bytes.size()));
+    write(folder / "sky.hdr", bytes);
+    return words("sky.hdr");
+  };
+  CHECK(hdr(8193, 8192, 1 << 20).find("together to 67108864 pixels") != std::string::npos);
+  CHECK(hdr(1280, 1024, 1024).find("ends before") != std::string::npos);
+  CHECK(hdr(1281, 1024, 1024).find("1310720 pixels are the most that such a file may have") !=
+        std::string::npos);
+  write_image(folder / "sky.exr", {2048, 1024, Encoding::light, std::vector<vec3>(2048 * 1024, vec3(0.5f))});
+  CHECK(words("sky.exr").empty());
 }
 
 // Catches: a cut or damaged file whose rest is made up.
