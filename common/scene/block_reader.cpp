@@ -152,6 +152,10 @@ std::string BlockReader::left_for_them(std::uint64_t left) const {
   return "the file has " + std::to_string(left) + " left for them";
 }
 
+void BlockReader::refuse_to_make(const std::string& what) const {
+  refuse(path_, 0, "unpacks to " + what + " that take more than " + unpack_it_yourself());
+}
+
 namespace {
 
 bool is_space(char c) { return c == ' ' || c == '\t'; }

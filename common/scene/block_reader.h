@@ -14,8 +14,8 @@ namespace trilha {
 
 /// The bytes of a file from the first to the last, of which a block is in memory at a time. A file that gzip
 /// packed (RFC 1952: its first two bytes say so, not its name) is unpacked, all its members, and its
-/// checksums are verified. It may unpack to most_unpacked() bytes: what gzip makes of scanned and modelled
-/// meshes is an eighth of them or more, of zeros a thousandth, which would fill any memory.
+/// checksums are verified. It may unpack to most_unpacked() bytes: gzip makes of real meshes an eighth or
+/// more, of zeros a thousandth, which would fill any memory.
 class BlockReader {
  public:
   /// That many bytes can be held at once.
@@ -55,6 +55,13 @@ class BlockReader {
   /// "the file has 7 left for them", for a refusal of what needs more, where `left` of most_left() are left;
   /// says what to do where the file is packed and might hold more.
   std::string left_for_them(std::uint64_t left) const;
+
+  /// How many vertices or triangles, of so many bytes each, may be made of the file: of a packed one what it
+  /// may unpack to bounds them, too, for a byte of a strip becomes a triangle of twelve.
+  std::uint64_t most_made(std::size_t bytes_each) const {
+    return unpacker_ ? most_unpacked(size_) / bytes_each : UINT64_MAX;
+  }
+  [[noreturn]] void refuse_to_make(const std::string& what) const;
 
  private:
   struct Unpacker;

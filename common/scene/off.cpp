@@ -14,13 +14,15 @@ using namespace std::string_literals;
 
 class OffReader {
  public:
-  explicit OffReader(const std::string& path) : path_(path), bytes_(path), text_(bytes_, '#'), mesh_(path) {}
+  explicit OffReader(const std::string& path)
+      : path_(path), bytes_(path), text_(bytes_, '#'), mesh_(bytes_) {}
 
   Scene read() {
     header();
     if (faces_ == 0) {
       for (std::uint64_t i = 0; i < vertices_; ++i) next("vertex", i, vertices_);
     } else {
+      mesh_.expect_vertices(vertices_, normals_, texture_coordinates_);
       for (std::uint64_t i = 0; i < vertices_; ++i) vertex(i);
     }
     mesh_.vertices_are_known();

@@ -437,6 +437,7 @@ class Data {
   void vertices(const Element& element) {
     Mesh& mesh = mesh_.mesh;
     const bool normals = element.has_all({nx, ny, nz}), texture_coordinates = element.has_all({u, v});
+    mesh_.expect_vertices(element.count, normals, texture_coordinates);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       std::array<float, 8> of{};
       values_.begin(element, i);
@@ -518,7 +519,7 @@ Scene load_ply(const std::string& path, const LoadOptions&) try {
   BlockReader bytes(path);
   TextReader text(bytes);
   const Header header = HeaderReader(bytes, text).read();
-  PolygonMesh mesh(path);
+  PolygonMesh mesh(bytes);
   if (!header.passed_over.empty()) mesh.warnings.push_back(path + ": not read: " + header.passed_over);
   if (header.part_of_normal)
     mesh.warnings.push_back(path + ": nx, ny, nz are not all there: no normals are read");

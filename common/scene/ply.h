@@ -18,8 +18,8 @@ namespace trilha {
 /// Everything else is passed over and named in a warning. Vertices and triangles keep the file's order, also
 /// those that nothing uses or that repeat a vertex. In ASCII an element stands on a line of its own, as in
 /// Turk's own programs. The file is read in blocks: memory holds the mesh and half a megabyte, whatever the
-/// file promises. Where gzip packed it, it may unpack to 64 MB and 32 times its bytes; real
-/// meshes unpack to 1.2 to 8 times.
+/// file promises. Where gzip packed it, it may unpack to 64 MB and 32 times its bytes, and
+/// so much may its vertices take and its triangles; real meshes unpack to 1.2 to 8 times their bytes.
 ///
 /// Throws InputError, with the line where the file is ASCII, else with the element and its number, counted
 /// from 1: where the header is malformed or promises more than the file's bytes can hold or may unpack to,

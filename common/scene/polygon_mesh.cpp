@@ -12,9 +12,16 @@ std::string scene_name(const std::string& path) {
   return name.stem().string();
 }
 
+void PolygonMesh::expect_vertices(std::uint64_t n, bool normals, bool texture_coordinates) {
+  const std::size_t each =
+      sizeof(vec3) + (normals ? sizeof(vec3) : 0) + (texture_coordinates ? sizeof(vec2) : 0);
+  if (n > bytes_.most_made(each)) bytes_.refuse_to_make("vertices");
+}
+
 void PolygonMesh::push(const uvec3& triangle, std::uint64_t expected) {
   if (mesh.triangles.size() == most_triangles)
     refuse(path_, 0, "more than 4294967294 triangles; split the file");
+  if (mesh.triangles.size() == most_) bytes_.refuse_to_make("triangles");
   make_room(mesh.triangles, expected);
   mesh.triangles.push_back(triangle);
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/scene/block_reader.h"
 #include "common/scene/polygon.h"
 #include "common/scene/scene.h"
 
@@ -29,14 +30,20 @@ class PolygonMesh {
   Mesh mesh;  ///< whose vertices the reader fills in; a normal that has no length is (0, 0, 0) until scene()
   std::vector<std::string> warnings;  ///< those of the scene
 
-  explicit PolygonMesh(const std::string& path) : path_(path) {}
+  /// Of the file whose bytes these are, and which they outlive.
+  explicit PolygonMesh(const BlockReader& bytes)
+      : path_(bytes.path()), bytes_(bytes), most_(bytes.most_made(sizeof(uvec3))) {}
+
+  /// So many vertices will be there, with those attributes. Throws InputError where they would take more than
+  /// may be made of a packed file.
+  void expect_vertices(std::uint64_t n, bool normals, bool texture_coordinates);
 
   /// All vertices are there from now on: polygons are split at once.
   void vertices_are_known();
 
   /// Adds a face whose corners, of which there are at most most_corners, are vertices that exist or will.
   /// `expected` faces are thought to come in all. Fewer than three corners make no face: it is counted.
-  /// Throws InputError beyond most_triangles.
+  /// Throws InputError beyond most_triangles, and where they take more than may be made of a packed file.
   void add_face(const std::vector<std::uint32_t>& corners, std::uint64_t expected);
 
   /// Adds the next triangle of a strip; where it repeats a vertex it is a stitch between strips, no triangle.
@@ -55,6 +62,8 @@ class PolygonMesh {
   void split(const Unsplit& polygon);
 
   std::string path_;
+  const BlockReader& bytes_;
+  std::uint64_t most_;  // triangles
   bool vertices_known_ = false;
   std::vector<Unsplit> unsplit_;
   std::vector<std::uint32_t> corners_;  // of the polygon that is split

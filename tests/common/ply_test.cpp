@@ -834,6 +834,29 @@ TEST_CASE("PLY: what gzip packed may unpack to 64 MB and 32 times its bytes") {
   // where the header tells nothing
   const std::string list = "element junk 1\nproperty list uint uchar a\n";
   refused(packed(header(list + mesh) + "\x00\xe1\xf5\x05"s) + megabytes(101), 0, "unpacks to more than the ");
+  // where a few bytes become much: a byte of a strip a triangle, three of a vertex twelve
+  const auto made = [&](const std::string& bytes, const std::string& what) {
+    write_anew(path, bytes);
+    peak_memory_since_last_call();
+    const std::size_t before = peak_memory_since_last_call();
+    check_refusal(refusal([&] { load_ply(path); }), path, 0,
+                  "unpacks to " + what + " that take more than the " +
+                      std::to_string(64'000'000 + 32 * bytes.size()) + " bytes allowed");
+    const std::size_t peak = peak_memory_since_last_call();
+    if (peak > 0) CHECK(peak < before + 130 * megabyte);
+  };
+  std::string strip;
+  while (strip.size() < 6 * megabyte) strip += "\0\1\2"s;
+  made(packed(header("element vertex 3\n" + xyz +
+                     "element tristrips 1\n"
+                     "property list uint uchar vertex_indices\n") +
+              std::string(36, '\0') + "\x80\x8d\x5b\0"s + strip),
+       "triangles");
+  made(packed(header("element vertex 6000000\nproperty char x\nproperty char y\nproperty char z\n"
+                     "element face 1\n" +
+                     indices) +
+              std::string(18 * megabyte + 13, '\0')),
+       "vertices");
 
   // To the byte: the list takes what the mesh leaves.
   const std::string before_list = header(mesh + list) + std::string(36, '\0') + "\3\0\0\0\0\1\0\0\0\2\0\0\0"s;
