@@ -431,7 +431,9 @@ TEST_CASE("what editors write is read: line ends, byte order mark, tabs, comment
     const Mesh& mesh = scene.meshes[0];
     CHECK(mesh.triangles[0] == uvec3(0, 1, 2));
     CHECK(mesh.positions == std::vector<vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
-    CHECK(scene.warnings.empty());
+    const bool coloured = text.find("0 1 1 1\n") != text.npos;
+    CHECK(warns_of(scene, "2 vertex colours ignored") == coloured);
+    CHECK(scene.warnings.size() == (coloured ? 1 : 0));
     CHECK(scene.materials.size() == 1);
   }
   CHECK(loaded(texts.back()).meshes[0].name == "\xc3\xa9t\xc3\xa9");
