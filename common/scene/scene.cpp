@@ -39,6 +39,8 @@ Camera framing(const Box& box, const vec3& up) {
   double radius = 0.5 * glm::length(upper - lower);
   const double distance_from_origin = largest_component(centre);
   if (radius == 0) radius = distance_from_origin > 0 ? 0.1 * distance_from_origin : 1;
+  // Floats have no room between them for less: eye and target would be one point.
+  radius = std::max(radius, double(std::numeric_limits<float>::min()));
 
   // Eye and target are rounded to floats: far from the origin that moves them by as much as the box is wide.
   // The sphere that is framed holds the box wherever they go.

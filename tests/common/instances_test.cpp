@@ -268,6 +268,19 @@ TEST_CASE("the camera stands in a room and before a body") {
   CHECK(std::isfinite(framing(scene_of({}), up).eye.x));
 }
 
+// Catches: an eye that is rounded onto its target, from which there is nothing to see.
+TEST_CASE("even a scene that is smaller than floats can tell apart has a camera that looks somewhere") {
+  for (const float x : {1e-45f, 1e-38f, 0.0f, -3e-41f}) {
+    Mesh mesh;
+    mesh.positions = {{x, 0, 0}, {0, x, 0}, {0, 0, x}};
+    mesh.triangles = {{0, 1, 2}};
+    for (Mesh some : {mesh, Mesh{"", {{x, 0, 0}}, {{0, 0, 0}}, {}, {}, {}}}) {
+      const Camera camera = framing(scene_of({std::move(some)}), {0, 1, 0});
+      CHECK(camera.eye != camera.target);
+    }
+  }
+}
+
 // Catches: a portrait that cuts off what the camera was meant to show.
 TEST_CASE("in an image that is higher than wide the field of view becomes that of the width") {
   Camera camera;
