@@ -5,7 +5,6 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <numeric>
-#include <sstream>
 
 #include "common/scene/text.h"
 
@@ -173,12 +172,6 @@ class Builder {
 const std::string no_text;
 const std::vector<Json> no_list;
 const std::vector<std::pair<std::string, Json>> no_members;
-
-std::string shown(double number) {
-  std::ostringstream text;
-  text << number;
-  return text.str();
-}
 
 }  // namespace
 

@@ -319,23 +319,16 @@ std::string grouped(std::size_t number) {
   return text;
 }
 
-std::string shown(double number) {
-  std::ostringstream text;
-  text.precision(15);  // 10000000, not 1e+07
-  text << number;
-  return text.str();
-}
-
 /// The parameter as it is unless said: hall:detail=4, cornell_box:light=panel.
 std::string unless_said(const SceneEntry& entry, const Parameter& p) {
-  const std::string value = p.words.empty() ? shown(p.value) : p.words[std::size_t(p.value - p.low)];
+  const std::string value = p.words.empty() ? shown(p.value, 15) : p.words[std::size_t(p.value - p.low)];
   return entry.name + ":" + p.name + "=" + value;
 }
 
 /// What it may be: a range, or one of some words.
 std::string choices(const Parameter& p) {
   if (p.words.empty())
-    return shown(p.low) + " to " + shown(p.high) + (p.whole ? "" : ", not only whole numbers");
+    return shown(p.low, 15) + " to " + shown(p.high, 15) + (p.whole ? "" : ", not only whole numbers");
   std::string text = p.words[0];
   for (std::size_t i = 1; i < p.words.size(); ++i)
     text += (i + 1 == p.words.size() ? " or " : ", ") + p.words[i];

@@ -3,19 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <sstream>
 
 #include "common/error.h"
 #include "common/scene/text.h"
 
 namespace trilha {
 namespace {
-
-std::string shown(double number) {
-  std::ostringstream text;
-  text << number;
-  return text.str();
-}
 
 std::string listed(const std::vector<std::string>& words) {
   std::string list;

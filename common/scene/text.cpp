@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <sstream>
 #include <system_error>
 
 #include "common/error.h"
@@ -43,6 +44,13 @@ void refuse(const std::string& path, std::size_t line, const std::string& what) 
 
 std::string counted(std::uint64_t n, const std::string& what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+std::string shown(double number, int digits) {
+  std::ostringstream text;
+  text.precision(digits);
+  text << number;
+  return text.str();
 }
 
 std::string in_quotes(std::string_view text) {

@@ -20,6 +20,9 @@ std::string counted(std::uint64_t n, const std::string& what);
 /// 8859 among them, become question marks.
 std::string printable(std::string_view text);
 
+/// The number with so many digits at most: 15 write 10000000, not 1e+07.
+std::string shown(double number, int digits = 6);
+
 /// The text in quotes, cut to 40 bytes, without what could break a line of output.
 std::string in_quotes(std::string_view text);
 
