@@ -4,7 +4,6 @@
 
 #include "chapters/01_ray_casting/experiments.h"
 #include "chapters/01_ray_casting/stability.h"
-#include "common/image/colour_map.h"
 
 namespace trilha {
 namespace {
@@ -88,14 +87,15 @@ class RayCastingDemo final : public Demo {
     return finished;
   }
 
-  Image develop(const Film& film, const Stream& stream) const override {
-    Image image = film.image(stream);
-    if (settings_.shading != Shading::lambert) image.encoding = Encoding::display;
+  Display display() const override {
+    Display display;
+    if (settings_.shading != Shading::lambert) display.encoding = Encoding::display;
     if (settings_.shading == Shading::tests) {
-      const float most = static_cast<float>(caster_->triangle_count());
-      for (vec3& pixel : image.pixels) pixel = viridis(most > 0 ? pixel.x / most : 0);
+      display.heatmap = true;
+      display.most = static_cast<float>(caster_->triangle_count());
+      display.counted = "triangles tested";
     }
-    return image;
+    return display;
   }
 
   std::vector<std::string> heatmaps() const override { return {"tests"}; }

@@ -311,7 +311,7 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
     if (!up.empty()) options.up = parse_vector("--up", up);
     if (field_of_view) require("--fov", *field_of_view, 0.001f, 179.0f);
     options.field_of_view = field_of_view;
-    require("--samples", options.samples, 1, 1 << 24);
+    if (options.samples) require("--samples", *options.samples, 1, 1 << 24);
     require("--time", options.seconds, 0.0, 1e6);
     require("--threads", options.threads, 0, 1024);
     require("--report-budget", options.report_budget, 1.0, 1e6);

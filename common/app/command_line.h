@@ -16,8 +16,9 @@ struct Options {
   std::string view;                ///< one of the scene's; empty for its camera
   std::optional<Backend> backend;  ///< empty: CUDA if it is there
   std::string output;              ///< empty: <chapter>.png in the working directory
-  int width = 640, height = 480;
-  int samples = 1;
+  int width = 0, height = 0;   ///< 0: as the window is, of a file 640×480
+  std::optional<int> samples;  ///< empty: 1 of a file, 1024 in a window
+  bool jitter = false;         ///< even a single sample goes anywhere in its pixel
   double seconds = 0;  ///< if above 0, samples are added until they have passed
   std::uint64_t seed = 0;
   int threads = 0;                      ///< 0: all
@@ -27,6 +28,7 @@ struct Options {
   double report_budget = 600;  ///< seconds
   std::vector<std::string> sweeps;
   bool stability = false;
+  bool headless = false;  ///< said so, or asked for what only a file can answer (--output, --time, --json, --explain)
   bool explain = false, json = false, quiet = false, list_settings = false, list_scenes = false;
   std::string listed;  ///< the scene or collection that --list-scenes names; empty for all
 };
@@ -40,5 +42,18 @@ struct Options {
 /// unknown names as well as wrong values, is an InputError (exit code 1) with file, line and name, for it was
 /// read, not typed.
 std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings& settings, Options& options);
+
+/// The flags that lead to these options and settings, one by one and unquoted ("--scene", "bunny", …), without
+/// those that are as they are by default: what read_command_line takes back. Only what decides the picture.
+std::vector<std::string> flags_of(const Options& options, const Settings& settings);
+
+/// The same as a shell command, "./trilha run 01 …", quoted where needed.
+std::string command_of(const std::string& chapter, const std::vector<std::string>& flags);
+
+/// The same as a --config file.
+std::string config_of(const std::vector<std::string>& flags);
+
+/// Reads a --config file into options and settings that are as declared. Throws InputError with file and line.
+void read_config_file(const std::string& path, Demo& demo, Settings& settings, Options& options);
 
 }  // namespace trilha

@@ -3,12 +3,13 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/app/settings.h"
-#include "common/image/film.h"
+#include "common/image/frame.h"
 #include "common/parallel/backend.h"
 #include "common/report/report.h"
 #include "common/report/stability.h"
@@ -37,6 +38,21 @@ struct SampleRequest {
   std::function<bool(double)> keep_going;
 };
 
+/// A line in the scene, drawn over the image.
+struct Line {
+  enum class Ink { ray, surface, structure };
+  vec3 from, to;
+  Ink ink = Ink::structure;
+};
+
+/// What a pixel's ray met, in words and lines.
+struct Inspection {
+  std::vector<std::pair<std::string, std::string>> facts;  ///< "t", "3.25 ± 2e-7"
+  std::vector<Line> lines;
+  std::optional<vec3> point;  ///< where it hit
+};
+
+/// A chapter's technique, as the program around it sees it. All calls come from one thread at a time.
 class Demo {
  public:
   virtual ~Demo() = default;
@@ -52,15 +68,30 @@ class Demo {
   virtual std::vector<std::string> not_shown(const Scene& /*scene*/) const { return {}; }
 
   /// Builds all that the settings need, on the stream's backend; replaces what was built before. The scene
-  /// stays alive and unchanged until the next build.
+  /// stays alive and unchanged until the next build. A build may be cancelled (by Cancelled): the demo then
+  /// is built again before anything else is asked of it.
   virtual void build(const Scene& scene, const Stream& stream) = 0;
 
   /// Adds a sample to every pixel of the film. Returns false if told to stop; what was done stays in the
   /// film.
   virtual bool add_sample(Film& film, const SampleRequest& request) = 0;
 
-  /// The film as an image: its encoding, and colours in place of counts where a heat map was asked for.
-  virtual Image develop(const Film& film, const Stream& stream) const { return film.image(stream); }
+  /// What the samples of the film stand for, with the settings as they are.
+  virtual Display display() const { return {}; }
+
+  /// What the ray through the centre of pixel x, y of a width × height image meets. May be asked within
+  /// keep_going.
+  virtual Inspection inspect(const Camera& /*camera*/, int /*width*/, int /*height*/, int /*x*/, int /*y*/) {
+    return {};
+  }
+
+  /// What there is of the structure to draw over the image, level by level: 0 levels where there is nothing.
+  virtual int overlay_levels() const { return 0; }
+  virtual std::vector<Line> overlay(int /*level*/) const { return {}; }
+
+  /// Changes the settings to those that a reference image is made with: the same picture, as exact as this
+  /// chapter can.
+  virtual void make_exact() {}
 
   /// Names that --heatmap takes, and the choice of one.
   virtual std::vector<std::string> heatmaps() const { return {}; }

@@ -97,7 +97,7 @@ Outcome build(Demo& demo, const Scene& scene, const Stream& stream) {
 void render(Demo& demo, const Scene& scene, const Stream& stream, const Options& options, Film& film,
             Outcome& outcome) {
   const bool timed = options.seconds > 0;
-  const int most = timed ? 1 << 24 : options.samples;
+  const int most = timed ? 1 << 24 : options.samples.value_or(1);
   Progress progress("rendering", timed ? options.seconds : most, options.quiet || options.json);
   if (timed) progress.stop_after(options.seconds);
   const auto start = Clock::now();
@@ -109,7 +109,7 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
       shown = done;
       return !progress.cancelled();
     };
-    const bool jittered = timed || most > 1;
+    const bool jittered = timed || most > 1 || options.jitter;
     const bool finished = demo.add_sample(film, {scene.camera, static_cast<std::uint32_t>(outcome.samples),
                                                  jittered, options.seed, band_ms, keep_going});
     if (!finished) break;
@@ -311,7 +311,7 @@ void run_report(Demo& demo, const Settings& settings, const Options& options,
     const Scene scene = load(options, {});  // whatever a value of the settings may read
     for (const std::string& warning : scene.warnings) warn(warning);
     report.run({sweep_experiment(sweeps, settings, scene, choose_backend(options), options.width,
-                                 options.height, options.samples, make_demo)});
+                                 options.height, options.samples.value_or(1), make_demo)});
   }
   for (const std::string& what : report.left_out()) warn("not in the report: " + what);
   if (!options.report.empty()) report.write(options.report);
@@ -364,6 +364,7 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
     check_output();
     return 0;
   }
+  if (options.width == 0) options.width = 640, options.height = 480;
   set_thread_count(options.threads);
   if (options.stability) {
     catch_interrupts();
@@ -401,7 +402,7 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   {
     Film film(stream, options.width, options.height);
     render(demo, scene, stream, options, film, outcome);
-    write_image(options.output, demo.develop(film, stream));
+    write_image(options.output, developed(film, demo.display(), stream));
   }
   if (options.explain) {
     if (scene.images_not_read > 0) measure_loading(options, demo.reads(), savings.front());

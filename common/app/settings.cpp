@@ -1,5 +1,6 @@
 #include "common/app/settings.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
@@ -50,42 +51,51 @@ void Setting::set_text(const std::string& text) const {
   put(x);
 }
 
-void Settings::flag(const std::string& name, bool& value, Effect effect, const std::string& help) {
-  add({name,
-       help,
-       Setting::Kind::flag,
-       effect,
-       0,
-       1,
-       {},
-       [&value] { return value; },
-       [&value](double x) { value = x != 0; }});
+void Setting::only_if(std::function<bool()> condition, const std::string& when) {
+  applies = std::move(condition);
+  only = when;
 }
 
-void Settings::integer(const std::string& name, int& value, int low, int high, Effect effect,
-                       const std::string& help) {
-  add({name,
-       help,
-       Setting::Kind::integer,
-       effect,
-       double(low),
-       double(high),
-       {},
-       [&value] { return value; },
-       [&value](double x) { value = static_cast<int>(x); }});
+void Settings::group(const std::string& heading, const std::string& lesson) {
+  group_ = heading;
+  lesson_ = lesson;
 }
 
-void Settings::number(const std::string& name, float& value, float low, float high, Effect effect,
-                      const std::string& help) {
-  add({name,
-       help,
-       Setting::Kind::number,
-       effect,
-       low,
-       high,
-       {},
-       [&value] { return value; },
-       [&value](double x) { value = static_cast<float>(x); }});
+Setting Settings::of_kind(Setting::Kind kind, const std::string& name, Effect effect,
+                          const std::string& help) const {
+  Setting setting{};
+  setting.name = name;
+  setting.help = help;
+  setting.kind = kind;
+  setting.effect = effect;
+  setting.group = group_;
+  setting.lesson = lesson_;
+  return setting;
+}
+
+Setting& Settings::flag(const std::string& name, bool& value, Effect effect, const std::string& help) {
+  Setting setting = of_kind(Setting::Kind::flag, name, effect, help);
+  setting.get = [&value] { return value; };
+  setting.put = [&value](double x) { value = x != 0; };
+  return add(std::move(setting));
+}
+
+Setting& Settings::integer(const std::string& name, int& value, int low, int high, Effect effect,
+                           const std::string& help) {
+  Setting setting = of_kind(Setting::Kind::integer, name, effect, help);
+  setting.low = low, setting.high = high;
+  setting.get = [&value] { return value; };
+  setting.put = [&value](double x) { value = static_cast<int>(x); };
+  return add(std::move(setting));
+}
+
+Setting& Settings::number(const std::string& name, float& value, float low, float high, Effect effect,
+                          const std::string& help) {
+  Setting setting = of_kind(Setting::Kind::number, name, effect, help);
+  setting.low = low, setting.high = high;
+  setting.get = [&value] { return value; };
+  setting.put = [&value](double x) { value = static_cast<float>(x); };
+  return add(std::move(setting));
 }
 
 const Setting& Settings::operator[](const std::string& name) const {
@@ -94,11 +104,30 @@ const Setting& Settings::operator[](const std::string& name) const {
   throw std::out_of_range("no setting is called " + name);
 }
 
-void Settings::add(Setting setting) {
+std::vector<std::string> Settings::texts() const {
+  std::vector<std::string> texts;
+  for (const Setting& setting : settings_) texts.push_back(setting.text());
+  return texts;
+}
+
+void Settings::set_texts(const std::vector<std::string>& texts) const {
+  for (std::size_t i = 0; i < settings_.size(); ++i) settings_[i].set_text(texts.at(i));
+}
+
+Effect Settings::difference(const std::vector<std::string>& before,
+                            const std::vector<std::string>& after) const {
+  Effect effect = Effect::none;
+  for (std::size_t i = 0; i < settings_.size(); ++i)
+    if (before.at(i) != after.at(i)) effect = std::max(effect, settings_[i].effect);
+  return effect;
+}
+
+Setting& Settings::add(Setting setting) {
   for (const Setting& other : settings_)
     if (other.name == setting.name) throw std::logic_error("two settings are called " + setting.name);
   setting.initial = setting.get();
   settings_.push_back(std::move(setting));
+  return settings_.back();
 }
 
 }  // namespace trilha

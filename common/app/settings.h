@@ -30,9 +30,19 @@ struct Setting {
   std::function<double()> get;  ///< the value now; a choice's is the chosen entry's `value`
   std::function<void(double)> put;
   double initial = 0;
+  std::string group;   ///< under which heading the panel shows it
+  std::string lesson;  ///< the heading of the chapter's README that explains it
+  std::function<bool()> applies;  ///< empty: always
+  std::string only;               ///< when it applies, for people: "only with --shading lambert or normals"
+
+  /// Does it change anything, as the other settings are?
+  bool active() const { return !applies || applies(); }
+  bool changed() const { return get() != initial; }
 
   /// The value as a word or number, as the command line takes it.
   std::string text() const;
+  /// It changes something only where the condition on other settings holds; `when` says which, for people.
+  void only_if(std::function<bool()> condition, const std::string& when);
   /// Sets the value from such a text. Throws UsageError if it is no such value, InputError if it is out of
   /// range.
   void set_text(const std::string& text) const;
@@ -40,27 +50,43 @@ struct Setting {
 
 class Settings {
  public:
-  void flag(const std::string& name, bool& value, Effect effect, const std::string& help);
-  void integer(const std::string& name, int& value, int low, int high, Effect effect,
-               const std::string& help);
-  void number(const std::string& name, float& value, float low, float high, Effect effect,
-              const std::string& help);
+  /// Settings declared from now on stand under this heading, and are explained under that heading of the
+  /// chapter's README.
+  void group(const std::string& heading, const std::string& lesson = "");
+
+  /// Each returns what it declared, to be refined by only_if before the next is declared.
+  Setting& flag(const std::string& name, bool& value, Effect effect, const std::string& help);
+  Setting& integer(const std::string& name, int& value, int low, int high, Effect effect,
+                   const std::string& help);
+  Setting& number(const std::string& name, float& value, float low, float high, Effect effect,
+                  const std::string& help);
   template <class Enum>
-  void choice(const std::string& name, Enum& value, std::vector<Choice> choices, Effect effect,
+  Setting& choice(const std::string& name, Enum& value, std::vector<Choice> choices, Effect effect,
               const std::string& help) {
-    add({name, help, Setting::Kind::choice, effect, 0, 0, std::move(choices),
-         [&value] { return static_cast<double>(value); },
-         [&value](double x) { value = static_cast<Enum>(static_cast<int>(x)); }});
+    Setting setting = of_kind(Setting::Kind::choice, name, effect, help);
+    setting.choices = std::move(choices);
+    setting.get = [&value] { return static_cast<double>(value); };
+    setting.put = [&value](double x) { value = static_cast<Enum>(static_cast<int>(x)); };
+    return add(std::move(setting));
   }
 
   const std::vector<Setting>& all() const { return settings_; }
   /// Throws std::out_of_range for an unknown name.
   const Setting& operator[](const std::string& name) const;
 
+  /// All values as texts, in the order of declaration, and back: a set of settings that can be kept, compared
+  /// and given to another demo of the same chapter.
+  std::vector<std::string> texts() const;
+  void set_texts(const std::vector<std::string>& texts) const;
+  /// The largest effect of those settings whose texts differ.
+  Effect difference(const std::vector<std::string>& before, const std::vector<std::string>& after) const;
+
  private:
-  void add(Setting setting);
+  Setting of_kind(Setting::Kind kind, const std::string& name, Effect effect, const std::string& help) const;
+  Setting& add(Setting setting);
 
   std::vector<Setting> settings_;
+  std::string group_, lesson_;
 };
 
 }  // namespace trilha

@@ -54,7 +54,7 @@ Renderer renderer_of(Variant& variant, const Scene& scene, const Stream& stream)
     return variant.demo->add_sample(
         film, {scene.camera, index, true, seed, 400, [&](double) { return keep_going(); }});
   };
-  renderer.develop = [&variant, stream](const Film& film) { return variant.demo->develop(film, stream); };
+  renderer.develop = [&variant, stream](const Film& film) { return developed(film, variant.demo->display(), stream); };
   return renderer;
 }
 

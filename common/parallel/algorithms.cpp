@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "common/parallel/algorithms_cpu.h"
+#include "common/parallel/cancellation.h"
 
 #if defined(__CUDACC__)
 #include "cuda/algorithms.h"
@@ -22,37 +23,63 @@ void require_32_bit_indices(std::size_t n) {
 
 template <class T, class Operation>
 T reduce(const Stream& stream, const T* values, std::size_t n, T start, Operation operation) {
-  if (stream.backend() == Backend::cpu) return cpu::reduce(values, n, start, operation);
+  if (stream.backend() == Backend::cpu) {
+    const T result = cpu::reduce(values, n, start, operation);
+    stop_if_cancelled();
+    return result;
+  }
+  stop_if_cancelled();
   TRILHA_ON_DEVICE(reduce(stream.native(), values, n, start, operation));
 }
 
 void exclusive_scan(const Stream& stream, const std::uint32_t* values, std::uint32_t* sums, std::size_t n) {
-  if (stream.backend() == Backend::cpu) return cpu::exclusive_scan(values, sums, n);
+  if (stream.backend() == Backend::cpu) {
+    cpu::exclusive_scan(values, sums, n);
+    return stop_if_cancelled();
+  }
+  stop_if_cancelled();
   TRILHA_ON_DEVICE(exclusive_scan(stream.native(), values, sums, n));
 }
 
 void exclusive_scan(const Stream& stream, const std::uint64_t* values, std::uint64_t* sums, std::size_t n) {
-  if (stream.backend() == Backend::cpu) return cpu::exclusive_scan(values, sums, n);
+  if (stream.backend() == Backend::cpu) {
+    cpu::exclusive_scan(values, sums, n);
+    return stop_if_cancelled();
+  }
+  stop_if_cancelled();
   TRILHA_ON_DEVICE(exclusive_scan(stream.native(), values, sums, n));
 }
 
 void sort_by_key(const Stream& stream, std::uint32_t* keys, std::uint32_t* values, std::size_t n,
                  [[maybe_unused]] int key_bits) {
   require_32_bit_indices(n);
-  if (stream.backend() == Backend::cpu) return cpu::sort_by_key(keys, values, n);
+  if (stream.backend() == Backend::cpu) {
+    cpu::sort_by_key(keys, values, n);
+    return stop_if_cancelled();
+  }
+  stop_if_cancelled();
   TRILHA_ON_DEVICE(sort_by_key(stream.native(), keys, values, n, key_bits));
 }
 
 void sort_by_key(const Stream& stream, std::uint64_t* keys, std::uint32_t* values, std::size_t n,
                  [[maybe_unused]] int key_bits) {
   require_32_bit_indices(n);
-  if (stream.backend() == Backend::cpu) return cpu::sort_by_key(keys, values, n);
+  if (stream.backend() == Backend::cpu) {
+    cpu::sort_by_key(keys, values, n);
+    return stop_if_cancelled();
+  }
+  stop_if_cancelled();
   TRILHA_ON_DEVICE(sort_by_key(stream.native(), keys, values, n, key_bits));
 }
 
 std::size_t compact(const Stream& stream, const std::uint8_t* flags, std::size_t n, std::uint32_t* indices) {
   require_32_bit_indices(n);
-  if (stream.backend() == Backend::cpu) return cpu::compact(flags, n, indices);
+  if (stream.backend() == Backend::cpu) {
+    const std::size_t kept = cpu::compact(flags, n, indices);
+    stop_if_cancelled();
+    return kept;
+  }
+  stop_if_cancelled();
   TRILHA_ON_DEVICE(compact(stream.native(), flags, n, indices));
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // Reductions, prefix sums, sorting and compaction, by oneTBB on the CPU and by CUB on the device. Pointers
-// are to the stream's backend. Results that are returned by value have been waited for.
+// are to the stream's backend. Results that are returned by value have been waited for. All throw Cancelled in work
+// that was cancelled.
 
 #include <cstdint>
 

@@ -9,6 +9,7 @@
 
 #include "common/math/vector.h"
 #include "common/parallel/backend.h"
+#include "common/parallel/cancellation.h"
 
 #if defined(__CUDACC__)
 #include "cuda/launch.h"
@@ -30,7 +31,7 @@ struct IndexRange {
 /// and outputs as members and `TRILHA_HD void operator()(std::size_t i) const`. On the CPU the range is cut
 /// into batches of at least `batch` indices, and the call returns when all are done; on CUDA it returns at
 /// once, and the exception of a failed launch names the pass and the caller. A source that the C++ compiler
-/// sees can run passes on the CPU only.
+/// sees can run passes on the CPU only. Throws Cancelled in work that was cancelled.
 template <class Pass>
 void for_each(const Stream& stream, IndexRange range, const Pass& pass, std::size_t batch = 1024,
               std::source_location where = std::source_location::current()) {
@@ -42,8 +43,9 @@ void for_each(const Stream& stream, IndexRange range, const Pass& pass, std::siz
           const Pass local = pass;  // a copy that nothing else can change: its members stay in registers
           for (std::size_t i = part.begin(); i != part.end(); ++i) local(i);
         });
-    return;
+    return stop_if_cancelled();
   }
+  stop_if_cancelled();
 #if defined(__CUDACC__)
   cuda::launch(stream.native(), range.begin, range.end, pass, where);
 #else
