@@ -28,6 +28,11 @@ struct Options {
   double report_budget = 600;  ///< seconds
   std::vector<std::string> sweeps;
   bool stability = false;
+  std::string split;           ///< a file of flags: side B of a split view
+  bool fullscreen = false;
+  std::string screenshot;      ///< the window's picture, drawn without a display
+  int window_width = 0, window_height = 0;
+  float scale = 0;  ///< pixels to a unit of the window's design; 0: as the screen says
   bool headless = false;  ///< said so, or asked for what only a file can answer (--output, --time, --json, --explain)
   bool explain = false, json = false, quiet = false, list_settings = false, list_scenes = false;
   std::string listed;  ///< the scene or collection that --list-scenes names; empty for all

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/app/demo.h"
+#include "common/app/explain.h"
 
 namespace trilha {
 
@@ -73,7 +74,7 @@ struct Figures {
   int samples = 0;
   std::vector<std::pair<std::string, double>> stage_ms;
   std::vector<std::pair<std::string, std::size_t>> bytes;  ///< by kind; measured by Buffer's counter
-  std::vector<Omission> left_out;                          ///< without its function
+  std::vector<Saving> left_out;
   std::vector<ErrorPoint> errors;
   /// Of a heat map: how many pixels lie in each of 64 equal bins from 0 to `most` (1 where that is 0).
   std::vector<std::uint32_t> histogram;

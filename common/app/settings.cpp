@@ -5,21 +5,17 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/app/words.h"
 #include "common/error.h"
 
 namespace trilha {
 namespace {
 
-std::string number_text(double x) {
-  char text[32];
-  const auto result = std::to_chars(text, text + sizeof text, static_cast<float>(x));
-  return {text, result.ptr};
-}
+std::string number_text(double x) { return shortest(static_cast<float>(x)); }
 
 }  // namespace
 
-std::string Setting::text() const {
-  const double x = get();
+std::string Setting::text_of(double x) const {
   if (kind == Kind::flag) return x != 0 ? "true" : "false";
   if (kind != Kind::choice) return number_text(x);
   for (const Choice& choice : choices)

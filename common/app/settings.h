@@ -40,12 +40,16 @@ struct Setting {
   bool changed() const { return get() != initial; }
 
   /// The value as a word or number, as the command line takes it.
-  std::string text() const;
+  std::string text() const { return text_of(get()); }
+  std::string initial_text() const { return text_of(initial); }
   /// It changes something only where the condition on other settings holds; `when` says which, for people.
   void only_if(std::function<bool()> condition, const std::string& when);
   /// Sets the value from such a text. Throws UsageError if it is no such value, InputError if it is out of
   /// range.
   void set_text(const std::string& text) const;
+
+ private:
+  std::string text_of(double x) const;
 };
 
 class Settings {
