@@ -49,6 +49,7 @@ class Film {
 
   const Tiling& tiling() const { return tiling_; }
   vec4* pixels() { return pixels_.data(); }
+  const vec4* pixels() const { return pixels_.data(); }
   void clear(const Stream& stream) { fill_bytes(stream, pixels_.data(), 0, pixels_.bytes()); }
 
   /// The mean of the samples; black where there is none yet.
