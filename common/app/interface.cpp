@@ -117,13 +117,9 @@ void Interface::draw(int width, int height) {
   if (last_frame_ && ms_between(*last_frame_, begin) < 200) remember(times_.frame, ms_between(*last_frame_, begin));
   last_frame_ = begin;
   remember(times_.drawing, ms_between(begin, end));
-  if (!picture_.sides.empty()) {
-    std::uint64_t shown = ~std::uint64_t{0};
-    for (const auto& frame : picture_.sides) shown = std::min(shown, frame->generation);
-    if (const auto found = asked_.upper_bound(shown); found != asked_.begin()) {
-      remember(times_.latency, ms_between(std::prev(found)->second, end));
-      asked_.erase(asked_.begin(), found);
-    }
+  if (const auto found = asked_.upper_bound(picture_.generation); found != asked_.begin()) {
+    remember(times_.latency, ms_between(std::prev(found)->second, end));
+    asked_.erase(asked_.begin(), found);
   }
 }
 
@@ -131,10 +127,10 @@ bool Interface::complete() const {
   if (picture_.sides.size() != static_cast<std::size_t>(session_.side_count()) || !session_.opening().empty())
     return false;
   const Activity activity = session_.renderer().activity();
-  if (activity.generation != session_.generation() || activity.what != "done") return false;
+  if (activity.what != "done" || picture_.generation != session_.generation()) return false;
   if (session_.reference_samples() > 0 && !activity.reference_ready) return false;
-  for (std::size_t i = 0; i < picture_.sides.size(); ++i)
-    if (!picture_.sides[i]->complete) return false;
+  for (const auto& frame : picture_.sides)
+    if (!frame || !frame->complete) return false;
   return !session_.difference_shown() || difference_shown_ != nullptr;
 }
 

@@ -108,7 +108,7 @@ class Interface {
   // viewport.cpp
   void viewport();
   void show_picture(const Picture& picture);
-  void side_label(int side, const Frame& frame);
+  void side_label(int side);
   void divider();
   void difference(const Picture& picture);
   void lines_over_image();

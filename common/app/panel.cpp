@@ -306,7 +306,8 @@ void Interface::figure_rows() {
     ImGui::PopTextWrapPos();
     if (!f.histogram.empty()) {
       const Picture& picture = picture_;
-      const Display display = static_cast<std::size_t>(i) < picture.sides.size() ? picture.sides[static_cast<std::size_t>(i)]->display : Display{};
+      const auto k = static_cast<std::size_t>(i);
+      const Display display = k < picture.sides.size() && picture.sides[k] ? picture.sides[k]->display : Display{};
       histogram(("histogram" + std::to_string(i)).c_str(), {-1, units(110)}, f.histogram, display.most,
                 (sides == 2 ? std::string(side_names[i]) + ": " : "") + display.counted + ", pixels");
     }
@@ -366,6 +367,7 @@ void Interface::error_section() {
   mark("button Make reference");
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("The same view by the most exact settings, with other random numbers (R)");
   if (!on) return;
+  if (!activity.reference_failure.empty()) return ImGui::TextWrapped("%s", activity.reference_failure.c_str());
   if (!activity.reference_ready) {
     ImGui::ProgressBar(static_cast<float>(activity.reference_samples) / static_cast<float>(session_.reference_samples()), {-1, 0},
                        (std::to_string(activity.reference_samples) + " of " + counted(static_cast<std::uint64_t>(session_.reference_samples()), "sample")).c_str());

@@ -57,8 +57,7 @@ void Interface::viewport() {
       if (labels_shown_) lines_over_image();
       if (split) divider();
       if (labels_shown_)
-        for (std::size_t i = 0; i < picture_.sides.size(); ++i)
-          side_label(static_cast<int>(i), *picture_.sides[i]);
+        for (int i = 0; i < session_.side_count(); ++i) side_label(i);
     }
     ImGui::PopClipRect();
   }
@@ -70,20 +69,22 @@ void Interface::show_picture(const Picture& picture) {
   const ImVec2 low{static_cast<float>(image_.x), static_cast<float>(image_.y)};
   const ImVec2 high{low.x + static_cast<float>(image_.width), low.y + static_cast<float>(image_.height)};
   if (picture.sides.empty()) {
-    const std::string failure = session_.renderer().figures(0).failure;
-    const std::string text = !failure.empty()              ? failure
-                             : !session_.opening().empty() ? "Opening " + session_.opening() + " …"
+    const std::string text = !session_.opening().empty() ? "Opening " + session_.opening() + " …"
                                                            : "Preparing the first picture …";
     const float wrap = static_cast<float>(image_.width) * 0.8f;
     const ImVec2 size = ImGui::CalcTextSize(text.c_str(), nullptr, false, wrap);
     draw->AddText(fonts_.text, ImGui::GetFontSize(), {(low.x + high.x - size.x) / 2, (low.y + high.y - size.y) / 2},
-                  failure.empty() ? grey : white, text.c_str(), nullptr, wrap);
+                  grey, text.c_str(), nullptr, wrap);
     return;
   }
   // B lies over A, right of the divider
   const float middle = std::round(low.x + divider_ * static_cast<float>(image_.width));
   for (std::size_t i = 0; i < picture.sides.size(); ++i) {
     if (i == 1 && !session_.is_split()) break;
+    if (!picture.sides[i]) {  // it failed: no picture is better than one that is not its own
+      draw->AddRectFilled({i == 1 ? middle : low.x, low.y}, high, IM_COL32(20, 22, 26, 255));
+      continue;
+    }
     textures_[i]->show(picture.sides[i]);
     draw->PushClipRect({i == 1 ? middle : low.x, low.y}, high, true);
     draw->AddImage(texture_id(*textures_[i]), low, high);
@@ -132,20 +133,27 @@ std::string Interface::what_differs(int side, const Frame& frame, const Frame* o
   return other != nullptr ? "the same settings on both sides" : "all as declared";
 }
 
-void Interface::side_label(int side, const Frame& frame) {
-  const bool split = picture_.sides.size() == 2;
-  const Frame* other = split ? picture_.sides[static_cast<std::size_t>(1 - side)].get() : nullptr;
+void Interface::side_label(int side) {
+  const auto frame_of = [&](int i) -> const Frame* {
+    const auto k = static_cast<std::size_t>(i);
+    return k < picture_.sides.size() ? picture_.sides[k].get() : nullptr;
+  };
+  const bool split = session_.is_split();
+  const Frame *frame = frame_of(side), *other = split ? frame_of(1 - side) : nullptr;
   const Figures figures = session_.renderer().figures(side);
-  const std::string first = what_differs(side, frame, other);
-  std::string second;
-  if (!figures.failure.empty())
+  const bool failed = !figures.failure.empty();
+  std::string first, second;
+  if (frame) first = what_differs(side, *frame, other);
+  if (failed)
     second = figures.failure;
-  else if (frame.generation != session_.generation() && frame.side != session_.wanted().sides[static_cast<std::size_t>(side)])
+  else if (!frame)
+    second = "its first picture is on its way";
+  else if (frame->side != session_.wanted().sides[static_cast<std::size_t>(side)])
     second = "of the settings before; the new picture is on its way";
-  else if (frame.shrink > 1)
-    second = "coarse: 1 pixel in " + std::to_string(frame.shrink * frame.shrink);
+  else if (frame->shrink > 1)
+    second = "coarse: one pixel in " + std::to_string(frame->shrink * frame->shrink);
   else
-    second = counted(static_cast<std::uint64_t>(frame.samples), "sample") + ", " + duration(figures.sample_ms) +
+    second = counted(static_cast<std::uint64_t>(frame->samples), "sample") + ", " + duration(figures.sample_ms) +
              " each, " + formatted("%.3g", figures.mrays_per_s) + " Mrays/s";
   if (!figures.errors.empty()) second += ", RMSE " + formatted("%.2e", figures.errors.back().rmse);
 
@@ -168,23 +176,21 @@ void Interface::side_label(int side, const Frame& frame) {
   }
   draw->AddText(fonts_.text, line, {x + letter + pad, y + pad}, white, first.c_str(), nullptr, widest);
   draw->AddText(fonts_.text, line, {x + letter + pad, y + pad + a.y + units(2)},
-                figures.failure.empty() ? grey : colours::bad, second.c_str(), nullptr, widest);
+                failed ? colours::bad : grey, second.c_str(), nullptr, widest);
 
   // a heat map says what its colours mean
-  if (frame.display.heatmap && (side == 0 || other == nullptr || !other->display.heatmap)) {
+  if (frame && frame->display.heatmap && (side == 0 || !other || !other->display.heatmap)) {
     ImGui::SetCursorScreenPos({static_cast<float>(image_.x) + units(16),
                                static_cast<float>(image_.y + image_.height) - units(64)});
     const ImVec2 at = ImGui::GetCursorScreenPos();
     draw->AddRectFilled({at.x - units(8), at.y - units(8)}, {at.x + units(268), at.y + units(52)}, shade, units(5));
-    colour_bar({units(260), units(14)}, frame.display.most, frame.display.counted);
+    colour_bar({units(260), units(14)}, frame->display.most, frame->display.counted);
   }
 }
 
 void Interface::difference(const Picture& picture) {
   const std::optional<Comparison> comparison = session_.renderer().comparison();
-  std::uint64_t newest = 0;
-  for (const auto& frame : picture.sides) newest = std::max(newest, frame->generation);
-  const bool current = comparison && comparison->image && comparison->generation >= newest;
+  const bool current = comparison && comparison->image;
   ImDrawList* draw = ImGui::GetWindowDrawList();
   const ImVec2 low{static_cast<float>(image_.x), static_cast<float>(image_.y)};
   const ImVec2 high{low.x + static_cast<float>(image_.width), low.y + static_cast<float>(image_.height)};
@@ -223,7 +229,7 @@ void Interface::difference(const Picture& picture) {
 
 void Interface::lines_over_image() {
   ImDrawList* draw = ImGui::GetWindowDrawList();
-  const Camera& camera = picture_.sides.empty() ? session_.camera() : picture_.sides[0]->camera;
+  const Camera& camera = picture_.sides.empty() || !picture_.sides[0] ? session_.camera() : picture_.sides[0]->camera;
   const auto stroke = [&](const Line& line, float thick) {
     const auto ends = projected(camera, image_.width, image_.height, line.from, line.to);
     if (!ends) return;
