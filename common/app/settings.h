@@ -30,17 +30,19 @@ struct Setting {
   std::function<double()> get;  ///< the value now; a choice's is the chosen entry's `value`
   std::function<void(double)> put;
   double initial = 0;
-  std::string group;   ///< under which heading the panel shows it
-  std::string lesson;  ///< the heading of the chapter's README that explains it
+  std::string group;              ///< under which heading the panel shows it
+  std::string lesson;             ///< the heading of the chapter's README that explains it
   std::function<bool()> applies;  ///< empty: always
   std::string only;               ///< when it applies, for people: "only with --shading lambert or normals"
 
   /// Does it change anything, as the other settings are?
   bool active() const { return !applies || applies(); }
-  bool changed() const { return get() != initial; }
+  bool changed() const { return text() != text_of(initial); }
 
-  /// The value as a word or number, as the command line takes it.
-  std::string text() const;
+  /// The value as a word or number, as the command line takes it: the shortest that reads back exactly.
+  std::string text() const { return text_of(get()); }
+  /// The same of another value. Throws std::logic_error if a choice has no such value.
+  std::string text_of(double value) const;
   /// It changes something only where the condition on other settings holds; `when` says which, for people.
   void only_if(std::function<bool()> condition, const std::string& when);
   /// Sets the value from such a text. Throws UsageError if it is no such value, InputError if it is out of
@@ -62,7 +64,7 @@ class Settings {
                   const std::string& help);
   template <class Enum>
   Setting& choice(const std::string& name, Enum& value, std::vector<Choice> choices, Effect effect,
-              const std::string& help) {
+                  const std::string& help) {
     Setting setting = of_kind(Setting::Kind::choice, name, effect, help);
     setting.choices = std::move(choices);
     setting.get = [&value] { return static_cast<double>(value); };
@@ -75,7 +77,8 @@ class Settings {
   const Setting& operator[](const std::string& name) const;
 
   /// All values as texts, in the order of declaration, and back: a set of settings that can be kept, compared
-  /// and given to another demo of the same chapter.
+  /// and given to another demo of the same chapter. Throws std::out_of_range where there are fewer texts than
+  /// settings, else what set_text throws.
   std::vector<std::string> texts() const;
   void set_texts(const std::vector<std::string>& texts) const;
   /// The largest effect of those settings whose texts differ.
@@ -88,5 +91,9 @@ class Settings {
   std::vector<Setting> settings_;
   std::string group_, lesson_;
 };
+
+/// A line for each setting that was changed and changes nothing, as the other settings are: "--smooth has no
+/// effect here: only with --shading lambert or normals".
+std::vector<std::string> idle_settings(const Settings& settings);
 
 }  // namespace trilha
