@@ -105,8 +105,7 @@ Camera moved(const Camera& camera, double right, double up, double forward) {
   const dvec3 step = finite_or_zero(right) * frame.right + finite_or_zero(up) * frame.up +
                      finite_or_zero(forward) * frame.forward;
   result.eye = rounded(dvec3(camera.eye) + step);
-  // The step that the eye made: where float is coarse, the view stays rather than the length of the step.
-  result.target = rounded(dvec3(camera.target) + (dvec3(result.eye) - dvec3(camera.eye)));
+  result.target = rounded(dvec3(camera.target) + step);
   return result;
 }
 
@@ -161,7 +160,7 @@ std::optional<std::array<double, 4>> projected(const Camera& camera, int width, 
   const auto inside_a = inside(a), inside_b = inside(b);
   double begin = 0, end = 1;  // of the part that is left (Cyrus & Beck 1978)
   for (std::size_t i = 0; i < inside_a.size(); ++i) {
-    if (inside_a[i] < 0 && inside_b[i] < 0) return std::nullopt;
+    // where both ends are outside, the cut lies beyond them, and nothing is left
     const double cut = inside_a[i] / (inside_a[i] - inside_b[i]);
     if (inside_a[i] < 0) begin = std::max(begin, cut);
     if (inside_b[i] < 0) end = std::min(end, cut);
