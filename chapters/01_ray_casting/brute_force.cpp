@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "chapters/01_ray_casting/ray_casting.h"
 #include "chapters/01_ray_casting/triangle_blocks.h"
 #include "common/parallel/for_each.h"
@@ -23,7 +25,10 @@ template <class Test, class T>
 void trace_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles,
                      const RayOf<T>* rays, HitOf<T>* hits, std::size_t n) {
   if (loop == Loop::plain) {
-    for_each(stream, n, Trace<BruteForce<Triangles<Test, T>>>{{triangles}, 0, rays, hits}, 64);
+    // On the CPU it is between batches that a pass can be cancelled: of many triangles, a batch is one ray.
+    constexpr std::size_t most_tests = 1 << 17;  // in a batch: a millisecond or two
+    const std::size_t batch = std::clamp<std::size_t>(most_tests / std::max(triangles.count, 1u), 1, 64);
+    for_each(stream, n, Trace<BruteForce<Triangles<Test, T>>>{{triangles}, 0, rays, hits}, batch);
   } else if (stream.backend() == Backend::cpu) {
     trace_blocks(triangles, rays, hits, n);
   } else {

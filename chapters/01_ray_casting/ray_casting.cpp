@@ -121,14 +121,17 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
                         keep.texture_coordinates && scene.features.texture_coordinates,
                         diffuse_needed && (scene.features.materials || keep.materials)};
   const Mesh mesh = flattened(scene, parts);
+  stop_if_cancelled();
   positions_ = Buffer(stream_, mesh.positions);
   triangles_ = Buffer(stream_, mesh.triangles);
   normals_ = Buffer(stream_, mesh.normals);
   texture_coordinates_ = Buffer(stream_, mesh.texture_coordinates);
   materials_ = Buffer(stream_, mesh.materials);
+  stop_if_cancelled();
   if (diffuse_needed) {
     std::vector<vec3> diffuse;
     for (const Material& material : scene.materials) {
+      stop_if_cancelled();
       const std::int32_t texture = material.diffuse_map.texture;
       diffuse.push_back(texture < 0 ? material.diffuse
                                     : material.diffuse *
@@ -190,27 +193,36 @@ void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
   });
 }
 
+Hit RayCaster::trace(const Ray& ray) const {
+  const Buffer<Ray> rays(stream_, {ray});
+  Buffer<Hit> hits(stream_.backend(), 1);
+  trace(rays.data(), hits.data(), 1);
+  return hits.to_vector(stream_)[0];
+}
+
 bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sample, bool jittered,
                            std::uint64_t seed, double band_ms,
                            const std::function<bool(double)>& keep_going) {
   const Tiling& tiling = film.tiling();
   const PinholeCamera pinhole =
       PinholeCamera::make(camera, static_cast<int>(tiling.width), static_cast<int>(tiling.height));
-  const std::size_t most_tiles = std::min<std::size_t>(tiling.tiles(), 2048);
-  if (rays_.size() != most_tiles * Tiling::tile_size) {
+  // A band is a number of 8×4-pixel tiles: so small that many triangles fill no more than its time.
+  constexpr std::size_t group = 32;
+  const std::size_t most = std::min<std::size_t>(tiling.size(), 2048 * Tiling::tile_size);
+  if (rays_.size() != most) {
     rays_ = {}, hits_ = {};  // freed before the new ones are made
-    rays_ = Buffer<Ray>(stream_.backend(), most_tiles * Tiling::tile_size);
-    hits_ = Buffer<Hit>(stream_.backend(), most_tiles * Tiling::tile_size);
+    rays_ = Buffer<Ray>(stream_.backend(), most);
+    hits_ = Buffer<Hit>(stream_.backend(), most);
   }
-  // Until the machine's speed is known, a band has as many tests as a slow one makes in a second.
-  const double first_tests = stream_.backend() == Backend::cuda ? 1e10 : 1e8;
-  const double tile_tests = static_cast<double>(Tiling::tile_size) * std::max(count_, 1u);
-  const double first_tiles = tiles_per_ms_ > 0 ? band_ms * tiles_per_ms_ : first_tests / tile_tests;
+  // Until the machine's speed is known, a band has as many tests as a slow one makes in that time.
+  const double slow_tests_per_ms = stream_.backend() == Backend::cuda ? 1e7 : 1e5;
+  const double indices_per_ms =
+      indices_per_ms_ > 0 ? indices_per_ms_ : slow_tests_per_ms / std::max(count_, 1u);
+  const double first = std::min(band_ms * indices_per_ms, static_cast<double>(most)) / group;
   return for_each_band(
-      stream_, tiling.tiles(), static_cast<std::size_t>(std::clamp(first_tiles, 1.0, double(most_tiles))),
-      most_tiles, band_ms,
-      [&](std::size_t first_tile, std::size_t end_tile) {
-        const std::size_t begin = first_tile * Tiling::tile_size, end = end_tile * Tiling::tile_size;
+      stream_, tiling.size() / group, static_cast<std::size_t>(first), most / group, band_ms,
+      [&](std::size_t first_group, std::size_t end_group) {
+        const std::size_t begin = first_group * group, end = end_group * group;
         Timer band_timer(stream_), rays_timer(stream_);
         for_each(stream_, {begin, end},
                  PrimaryRays{pinhole, tiling, begin, seed, sample, jittered, rays_.data()});
@@ -229,8 +241,7 @@ bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sampl
           shade<Reads::hit_alone>(begin, end, film, camera);
         }
         times_.shade += shade_timer.milliseconds();
-        tiles_per_ms_ =
-            static_cast<double>(end_tile - first_tile) / std::max(band_timer.milliseconds(), 1e-3);
+        indices_per_ms_ = static_cast<double>(end - begin) / std::max(band_timer.milliseconds(), 1e-3);
       },
       keep_going);
 }

@@ -139,13 +139,15 @@ struct RayCastingSettings {
   Keep keep;
 };
 
+/// Does the shading mode show normals, so that it matters which?
+inline bool shows_normals(const RayCastingSettings& s) {
+  return s.shading == Shading::lambert || s.shading == Shading::normals;
+}
 /// What a shading mode reads of the surface.
 inline bool reads_surface(const RayCastingSettings& s) {
-  return s.shading == Shading::lambert || s.shading == Shading::normals || s.shading == Shading::facing;
+  return shows_normals(s) || s.shading == Shading::facing;
 }
-inline bool reads_normals(const RayCastingSettings& s) {
-  return s.smooth && (s.shading == Shading::lambert || s.shading == Shading::normals);
-}
+inline bool reads_normals(const RayCastingSettings& s) { return s.smooth && shows_normals(s); }
 
 /// Calls function(Test{}) with the chosen test's type.
 template <class Function>
@@ -284,21 +286,27 @@ struct StageTimes {
 /// Builds what the settings need of a scene, then adds samples to a film.
 class RayCaster {
  public:
-  /// Throws InputError for a scene of more than 2³² − 2 triangles, DeviceError if the backend is missing.
+  /// Throws InputError for a scene of more than 2³² − 2 triangles, DeviceError if the backend is missing,
+  /// Cancelled in work that was cancelled.
   RayCaster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream);
 
   /// Adds one sample to every pixel. keep_going(fraction) is asked after each band of about band_ms ms.
-  /// Returns false if stopped early.
+  /// Returns false if stopped early. Throws Cancelled in work that was cancelled; the film is then not to be
+  /// read.
   bool add_sample(Film& film, const Camera& camera, std::uint32_t sample, bool jittered, std::uint64_t seed,
                   double band_ms, const std::function<bool(double)>& keep_going);
 
   /// The nearest hit of each ray, by the settings' test and loop; both arrays lie on the stream's backend.
   void trace(const Ray* rays, Hit* hits, std::size_t n) const;
+  /// The same for one ray of the host.
+  Hit trace(const Ray& ray) const;
 
   /// The one setting that needs no rebuild.
   void set_one_sided(bool one_sided) { settings_.one_sided = one_sided; }
   const StageTimes& times() const { return times_; }
   std::uint32_t triangle_count() const { return count_; }
+  const Box& scene_bounds() const { return bounds_; }
+  const Stream& stream() const { return stream_; }
 
  private:
   template <Reads reads>
@@ -321,7 +329,7 @@ class RayCaster {
   Buffer<Ray> rays_;
   Buffer<Hit> hits_;
   StageTimes times_;
-  double tiles_per_ms_ = 0;  ///< of the last band
+  double indices_per_ms_ = 0;  ///< of the last band
 };
 
 }  // namespace trilha

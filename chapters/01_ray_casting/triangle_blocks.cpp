@@ -1,14 +1,13 @@
 #include "chapters/01_ray_casting/triangle_blocks.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
+
+#include "common/parallel/for_each.h"
 
 namespace trilha {
 namespace {
 
-constexpr std::size_t batch = 256;             // rays that share a chunk
+constexpr std::size_t most_rays = 256;         // that share a chunk
 constexpr std::size_t chunk_bytes = 16 << 10;  // half of a first-level cache
 
 /// Tests one ray against one block. Measuring is a loop without a branch, which the compiler turns into
@@ -33,34 +32,47 @@ inline void test_block(const Triangles<Test, T>& triangles, std::uint32_t block,
   }
 }
 
-}  // namespace
-
+/// Batch of rays → their hits, chunk by chunk. Between chunks, a tenth of a millisecond each, it asks whether
+/// to go on: all of them may take minutes.
 template <class Test, class T>
-void trace_blocks(const Triangles<Test, T>& triangles, const RayOf<T>* rays, HitOf<T>* hits, std::size_t n) {
-  using Constants = decltype(Test::constants(RayOf<T>{}));
-  const auto blocks =
-      static_cast<std::uint32_t>((std::size_t{triangles.count} + block_lanes - 1) / block_lanes);
-  constexpr std::uint32_t chunk = chunk_bytes / (block_lanes * Test::numbers * sizeof(T));
-  const std::size_t batches = (n + batch - 1) / batch;
-  tbb::parallel_for(std::size_t{0}, batches, [&](std::size_t b) {
+struct TraceBatch {
+  Triangles<Test, T> triangles;
+  const RayOf<T>* rays;
+  HitOf<T>* hits;
+  std::size_t n, batch;
+
+  void operator()(std::size_t b) const {
+    constexpr std::uint32_t chunk = chunk_bytes / (block_lanes * Test::numbers * sizeof(T));
+    const auto blocks =
+        static_cast<std::uint32_t>((std::size_t{triangles.count} + block_lanes - 1) / block_lanes);
     const std::size_t first = b * batch, last = std::min(n, first + batch);
-    Constants constants[batch];
+    decltype(Test::constants(RayOf<T>{})) constants[most_rays];
     for (std::size_t r = first; r < last; ++r) {
       constants[r - first] = Test::constants(rays[r]);
       hits[r] = {};
       hits[r].t = rays[r].t_max;
     }
-    for (std::uint32_t begin = 0; begin < blocks; begin += chunk) {
+    for (std::uint32_t begin = 0; begin < blocks && !is_cancelled(); begin += chunk) {
       const std::uint32_t end = std::min(blocks, begin + chunk);
       for (std::size_t r = first; r < last; ++r) {
         const RayOf<T> ray = rays[r];
-        const Constants own = constants[r - first];
+        const auto own = constants[r - first];
         HitOf<T> hit = hits[r];
         for (std::uint32_t block = begin; block < end; ++block) test_block(triangles, block, ray, own, hit);
         hits[r] = hit;
       }
     }
-  });
+  }
+};
+
+}  // namespace
+
+template <class Test, class T>
+void trace_blocks(const Triangles<Test, T>& triangles, const RayOf<T>* rays, HitOf<T>* hits, std::size_t n) {
+  // Few rays are shared out among all threads, down to eight, which still use a chunk well once it is there.
+  const std::size_t share = n / (8 * static_cast<std::size_t>(thread_count()));
+  const std::size_t batch = std::clamp<std::size_t>(share, 8, most_rays);
+  for_each(Backend::cpu, (n + batch - 1) / batch, TraceBatch<Test, T>{triangles, rays, hits, n, batch}, 1);
 }
 
 #define INSTANTIATE(Test, T) \

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <vector>
 
+#include "common/app/words.h"
 #include "common/error.h"
 #include "common/image/files.h"
 #include "common/scene/text.h"
@@ -49,14 +50,7 @@ std::pair<long long, long long> parse_size(const std::string& flag, const std::s
   return {*width, *height};
 }
 
-/// The shortest text that reads back as the number exactly.
-template <class T>
-std::string text_of(T number) {
-  char text[32];
-  const auto result = std::to_chars(text, text + sizeof text, number);
-  return {text, result.ptr};
-}
-std::string text_of(const vec3& v) { return text_of(v.x) + "," + text_of(v.y) + "," + text_of(v.z); }
+std::string text_of(const vec3& v) { return shortest(v.x) + "," + shortest(v.y) + "," + shortest(v.z); }
 
 template <class T>
 void require(const std::string& flag, T value, T low, T high) {
@@ -536,7 +530,7 @@ std::vector<std::string> flags_of(const Options& options, const Settings& settin
   if (options.eye) say("eye", text_of(*options.eye));
   if (options.target) say("target", text_of(*options.target));
   if (options.up) say("up", text_of(*options.up));
-  if (options.field_of_view) say("fov", text_of(*options.field_of_view));
+  if (options.field_of_view) say("fov", shortest(*options.field_of_view));
   for (const Setting& setting : settings.all()) {
     if (!setting.changed()) continue;
     if (setting.kind == Setting::Kind::flag)
@@ -548,7 +542,7 @@ std::vector<std::string> flags_of(const Options& options, const Settings& settin
   if (options.width > 0) say("size", std::to_string(options.width) + "x" + std::to_string(options.height));
   if (options.samples) say("samples", std::to_string(*options.samples));
   if (options.jitter) flags.emplace_back("--jitter");
-  if (options.seconds > 0) say("time", text_of(options.seconds));
+  if (options.seconds > 0) say("time", shortest(options.seconds));
   if (options.seed != 0) say("seed", std::to_string(options.seed));
   return flags;
 }

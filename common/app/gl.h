@@ -8,8 +8,8 @@
 namespace trilha {
 
 /// OpenGL failed, or the context was lost. One line.
-struct GraphicsError : std::runtime_error {
-  using std::runtime_error::runtime_error;
+struct GraphicsError : DeviceError {
+  using DeviceError::DeviceError;
 };
 
 /// Makes sure of OpenGL 4.5 in the current context and listens to its debug messages: throws GraphicsError
@@ -34,7 +34,7 @@ class FrameTexture {
   /// Copies the frame into the texture unless it is there already: device to device where OpenGL draws on the
   /// CUDA device that made the frame, else through the host.
   void show(const std::shared_ptr<const Frame>& frame);
-  void show(const Image& display_values);
+  void show(const std::shared_ptr<const Image>& display_values);
 
   unsigned texture() const;
   int width() const;

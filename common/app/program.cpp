@@ -8,11 +8,11 @@
 
 #include "common/app/command_line.h"
 #include "common/app/demo.h"
+#include "common/app/explain.h"
 #include "common/app/progress.h"
 #include "common/app/sweep.h"
 #include "common/guarded.h"
 #include "common/image/files.h"
-#include "common/math/statistics.h"
 #include "common/scene/library.h"
 #include "common/whole_file.h"
 
@@ -43,12 +43,6 @@ struct Outcome {
   double mrays_per_s() const { return render_ms > 0 ? rays / render_ms / 1e3 : 0; }
 };
 
-/// An omission with what it saved: differences of two measured runs, kept and left out taking turns.
-struct Saving {
-  Omission omission;
-  std::optional<double> bytes, ms;
-};
-
 Backend choose_backend(const Options& options) {
   const Backend backend = options.backend.value_or(Backend::cuda);
   const std::string reason = why_unavailable(backend);
@@ -62,15 +56,6 @@ Scene load(const Options& options, LoadOptions how) {
   Scene scene = load_scene(options.scene, how);
   scene.camera = camera_of(scene, options, double(options.width) / options.height);
   return scene;
-}
-
-Outcome build(Demo& demo, const Scene& scene, const Stream& stream) {
-  Outcome outcome;
-  const auto start = Clock::now();
-  demo.build(scene, stream);
-  stream.synchronize();
-  outcome.build_ms = milliseconds_since(start);
-  return outcome;
 }
 
 void render(Demo& demo, const Scene& scene, const Stream& stream, const Options& options, Film& film,
@@ -103,60 +88,6 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
   outcome.rays = demo.rays();
   outcome.stage_ms = demo.stage_times();
   outcome.bytes = peak_bytes(stream.backend());
-}
-
-/// Measures each omission on an image small enough to take a tenth of a second: five turns of kept and left
-/// out.
-void measure(Demo& demo, const Scene& scene, const Stream& stream, Options options, const Outcome& outcome,
-             std::vector<Saving>& savings) {
-  const double affordable = std::max(1024.0, 1e5 * outcome.mrays_per_s());
-  const double scale = std::min(1.0, std::sqrt(affordable / (double(options.width) * options.height)));
-  options.width = std::max(1, static_cast<int>(options.width * scale));
-  options.height = std::max(1, static_cast<int>(options.height * scale));
-  options.samples = 1;
-  options.seconds = 0;
-  options.quiet = true;
-  for (Saving& saving : savings) {
-    const Omission& omission = saving.omission;
-    if (!omission.keep) continue;  // it was not loaded
-    std::vector<double> ms[2];
-    double bytes[2] = {};
-    for (int turn = 0; turn < 6 && !interrupted(); ++turn)
-      for (const bool kept : {true, false}) {
-        omission.keep(kept);
-        Film film(stream, options.width, options.height);
-        Outcome run = build(demo, scene, stream);
-        render(demo, scene, stream, options, film, run);
-        bytes[kept] = static_cast<double>(live_bytes(stream.backend()));
-        if (turn == 0) continue;  // the warm-up
-        double total = 0;
-        for (const std::string& stage : omission.stages) {
-          if (stage == "build") total += run.build_ms;
-          for (const auto& [name, time] : run.stage_ms) total += name == stage ? time : 0;
-        }
-        ms[kept].push_back(total);
-      }
-    if (ms[0].size() < 5 || ms[1].size() < 5) return;  // interrupted: the rest stays unmeasured
-    saving.bytes = bytes[true] - bytes[false];
-    saving.ms = quartiles(ms[true]).median - quartiles(ms[false]).median;
-  }
-}
-
-/// The same for what was not even loaded: five turns of loading all and loading what the chapter reads.
-void measure_loading(const Options& options, const LoadOptions& reads, Saving& saving) {
-  std::vector<double> ms[2];
-  for (int turn = 0; turn < 6 && !interrupted(); ++turn)
-    for (const bool kept : {true, false}) {
-      const auto start = Clock::now();
-      const Scene scene = load(options, kept ? LoadOptions{} : reads);
-      if (turn > 0) ms[kept].push_back(milliseconds_since(start));  // the first is the warm-up
-      const auto size = static_cast<double>(bytes(scene));
-      saving.bytes = kept ? size : *saving.bytes - size;
-    }
-  if (ms[0].size() < 5 || ms[1].size() < 5)
-    saving.bytes.reset();
-  else
-    saving.ms = quartiles(ms[true]).median - quartiles(ms[false]).median;
 }
 
 std::string with_unit(double bytes) {
@@ -365,27 +296,24 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   for (const std::string& warning : scene.warnings) warn(warning);
   for (const std::string& warning : demo.not_shown(scene)) warn(warning);
 
-  Outcome outcome = build(demo, scene, stream);
+  Outcome outcome;
   outcome.load_ms = load_ms;
+  outcome.build_ms = timed_build(demo, scene, stream);
   catch_interrupts();  // until here there is nothing to keep, and Ctrl-C ends the program as it ends any other
-  std::vector<Saving> savings;
-  if (const std::size_t images = scene.images_not_read; images > 0)
-    savings.push_back(
-        {{images == 1 ? "an image of the scene" : std::to_string(images) + " images of the scene",
-          "this chapter reads none with these settings",
-          {},
-          {}},
-         {},
-         {}});
-  for (const Omission& omission : demo.omissions()) savings.push_back({omission, {}, {}});
+  std::vector<Saving> savings = left_out(demo, scene);
   {
     Film film(stream, options.width, options.height);
     render(demo, scene, stream, options, film, outcome);
     write_image(options.output, developed(film, demo.display(), stream));
   }
   if (options.explain) {
-    if (scene.images_not_read > 0) measure_loading(options, demo.reads(), savings.front());
-    measure(demo, scene, stream, options, outcome, savings);
+    if (scene.images_not_read > 0)
+      measure_loading([&](bool all) { return load(options, all ? LoadOptions{} : demo.reads()); },
+                      interrupted, savings.front());
+    measure(demo, scene, stream,
+            {scene.camera, options.width, options.height, options.jitter, options.seed, band_ms,
+             outcome.mrays_per_s()},
+            interrupted, savings);
   }
   if (options.json)
     print_json(demo, settings, scene, stream, options, outcome, savings);

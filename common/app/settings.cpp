@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/app/words.h"
 #include "common/error.h"
 
 namespace trilha {
@@ -12,11 +13,8 @@ namespace {
 
 /// The shortest text that reads back as x exactly: as a float, or as the whole number that it is.
 std::string number_text(double x, Setting::Kind kind) {
-  char text[32];
-  const auto result = kind == Setting::Kind::integer
-                          ? std::to_chars(text, text + sizeof text, static_cast<long long>(x))
-                          : std::to_chars(text, text + sizeof text, static_cast<float>(x));
-  return {text, result.ptr};
+  return kind == Setting::Kind::integer ? std::to_string(static_cast<long long>(x))
+                                        : shortest(static_cast<float>(x));
 }
 
 template <class T>

@@ -37,17 +37,19 @@ struct Setting {
 
   /// Does it change anything, as the other settings are?
   bool active() const { return !applies || applies(); }
-  bool changed() const { return text() != text_of(initial); }
+  bool changed() const { return text() != initial_text(); }
 
   /// The value as a word or number, as the command line takes it: the shortest that reads back exactly.
   std::string text() const { return text_of(get()); }
-  /// The same of another value. Throws std::logic_error if a choice has no such value.
-  std::string text_of(double value) const;
+  std::string initial_text() const { return text_of(initial); }
   /// It changes something only where the condition on other settings holds; `when` says which, for people.
   void only_if(std::function<bool()> condition, const std::string& when);
   /// Sets the value from such a text. Throws UsageError if it is no such value, InputError if it is out of
   /// range.
   void set_text(const std::string& text) const;
+
+ private:
+  std::string text_of(double value) const;
 };
 
 class Settings {

@@ -34,10 +34,6 @@ void append(void* context, void* data, int size) {
   bytes.append(static_cast<const char*>(data), static_cast<std::size_t>(size));
 }
 
-unsigned char to_byte(float value) {  // NaN and what lies below 0 become 0
-  return static_cast<unsigned char>(value > 0 ? std::min(value, 1.0f) * 255.0f + 0.5f : 0.0f);
-}
-
 /// The nearest colour that RGBE holds exactly: stb_image_write cuts mantissas off, which would darken every
 /// image by a quarter of a per cent, and takes what is negative or not finite for something else.
 vec3 rounded_to_rgbe(const vec3& light) {
@@ -172,11 +168,12 @@ void write_image(const std::string& path, const Image& image) {
     for (vec3& pixel : light.pixels) pixel = rounded_to_rgbe(pixel);
     written = stbi_write_hdr_to_func(append, &bytes, image.width, image.height, 3, &light.pixels[0].x);
   } else {
-    std::vector<unsigned char> encoded;
+    const SrgbBytes& srgb = SrgbBytes::table();
+    std::vector<std::uint8_t> encoded;
     encoded.reserve(3 * image.pixels.size());
     for (const vec3& pixel : image.pixels)
       for (int c = 0; c < 3; ++c)
-        encoded.push_back(to_byte(image.encoding == Encoding::light ? srgb_encoded(pixel[c]) : pixel[c]));
+        encoded.push_back(image.encoding == Encoding::light ? srgb(pixel[c]) : to_byte(pixel[c]));
     written =
         stbi_write_png_to_func(append, &bytes, image.width, image.height, 3, encoded.data(), 3 * image.width);
   }

@@ -42,9 +42,14 @@ class Film {
         pixels_(stream.backend(), static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
     clear(stream);
   }
+  /// A film of these sums, one a pixel, row by row from the top: as they are, so they may be uninitialised.
+  Film(int width, int height, Buffer<vec4> sums)
+      : tiling_{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)},
+        pixels_(std::move(sums)) {}
 
   const Tiling& tiling() const { return tiling_; }
   vec4* pixels() { return pixels_.data(); }
+  const vec4* pixels() const { return pixels_.data(); }
   void clear(const Stream& stream) { fill_bytes(stream, pixels_.data(), 0, pixels_.bytes()); }
 
   /// The mean of the samples; black where there is none yet.

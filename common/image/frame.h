@@ -1,6 +1,9 @@
 #pragma once
 // A film as a screen shows it: eight bits a channel, made on the machine where the film is.
 
+#include <cstdint>
+#include <string>
+
 #include "common/image/film.h"
 #include "common/image/image.h"
 
@@ -14,15 +17,18 @@ struct Display {
   std::string counted;  ///< what a heat map counts: "triangles tested"
 };
 
-/// The film as an image; black where there is no sample yet. Counts become viridis colours, as they are shown.
+/// The film as an image; black where there is no sample yet. Counts become viridis colours, which are display
+/// values, as they are shown. Made on the film's backend, which is the stream's.
 Image developed(const Film& film, const Display& display, const Stream& stream);
 
 /// A pixel as bytes: red, green, blue, 255, from the lowest byte up.
 using PackedPixel = std::uint32_t;
 
 /// The film's pixels row by row from the top, as bytes that equal those of a PNG that write_image makes of
-/// developed(). Pixels without a sample take that of `coarse`, a film of the same view with fewer pixels, if
-/// there is one; else they are transparent black. `out` lies on the stream's backend and has room for all pixels.
-void to_packed_pixels(const Stream& stream, Film& film, Film* coarse, const Display& display, PackedPixel* out);
+/// developed(). Pixels without a sample take that of `coarse`, a film of the same view with fewer pixels, at
+/// the same place, if there is one; else they are 0, transparent black. Films and `out`, which has room for
+/// all pixels, lie on the stream's backend; the device may still be at it on return.
+void to_packed_pixels(const Stream& stream, const Film& film, const Film* coarse, const Display& display,
+                      PackedPixel* out);
 
 }  // namespace trilha

@@ -1,7 +1,10 @@
 #include "common/image/image.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <limits>
+#include <stdexcept>
 
 namespace trilha {
 namespace {
@@ -34,6 +37,35 @@ double srgb_decoded_double(double display) {
   double y = (0.2803 + 1.2710 * x) - 0.5768 * square;
   for (int step = 0; step < 4; ++step) y = 0.8 * y + square / (5 * ((y * y) * (y * y)));
   return square * y;
+}
+
+const SrgbBytes& SrgbBytes::table() {
+  static const SrgbBytes table;
+  return table;
+}
+
+SrgbBytes::SrgbBytes() {
+  least_[0] = -std::numeric_limits<float>::infinity();
+  least_[256] = std::numeric_limits<float>::infinity();
+  std::uint32_t below =
+      0;  // the bits of a light whose byte is smaller; positive floats are in order as bits are
+  for (int byte = 1; byte <= 255; ++byte) {
+    std::uint32_t found = std::bit_cast<std::uint32_t>(1.0f);
+    while (found - below > 1) {
+      const std::uint32_t middle = below + (found - below) / 2;
+      (to_byte(srgb_encoded(std::bit_cast<float>(middle))) >= byte ? found : below) = middle;
+    }
+    least_[byte] = std::bit_cast<float>(found);
+  }
+  for (std::uint32_t bucket = 0, byte = 0; bucket < buckets; ++bucket) {
+    const std::uint32_t bits = (first_bucket + bucket) << shift;
+    while (std::bit_cast<float>(bits) >= least_[byte + 1]) ++byte;
+    if (std::bit_cast<float>(bits + (1u << shift) - 1) >= least_[std::min(byte + 2, 256u)])
+      throw std::logic_error("two thresholds of sRGB in one bucket");
+    first_[bucket] = static_cast<std::uint8_t>(byte);
+  }
+  if (!(least_[1] > lowest && least_[255] <= highest))
+    throw std::logic_error("a threshold of sRGB in no bucket");
 }
 
 Image as_light(Image image) { return encoded(std::move(image), Encoding::light, srgb_decoded); }

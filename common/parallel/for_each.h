@@ -3,6 +3,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <source_location>
@@ -29,21 +30,29 @@ struct IndexRange {
 
 /// Runs pass(i) for every i of the range, in any order and in parallel. A pass is a struct with its inputs
 /// and outputs as members and `TRILHA_HD void operator()(std::size_t i) const`. On the CPU the range is cut
-/// into batches of at least `batch` indices, and the call returns when all are done; on CUDA it returns at
+/// into parts of at least `batch` indices, and the call returns when all are done; on CUDA it returns at
 /// once, and the exception of a failed launch names the pass and the caller. A source that the C++ compiler
-/// sees can run passes on the CPU only. Throws Cancelled in work that was cancelled.
+/// sees can run passes on the CPU only. Throws Cancelled in work that was cancelled; on the CPU every thread
+/// asks after each `batch` indices, so they should take a millisecond at most.
 template <class Pass>
 void for_each(const Stream& stream, IndexRange range, const Pass& pass, std::size_t batch = 1024,
               std::source_location where = std::source_location::current()) {
-  if (range.size() == 0) return;
+  if (range.size() == 0) return stop_if_cancelled();
   if (stream.backend() == Backend::cpu) {
+    const std::size_t least = std::max<std::size_t>(batch, 1);
+    tbb::task_group_context loop;  // its own: it alone knows for sure whether a batch was left out
     tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(range.begin, range.end, std::max<std::size_t>(batch, 1)),
-        [&pass](const tbb::blocked_range<std::size_t>& part) {
+        tbb::blocked_range<std::size_t>(range.begin, range.end, least),
+        [&pass, least](const tbb::blocked_range<std::size_t>& part) {
           const Pass local = pass;  // a copy that nothing else can change: its members stay in registers
-          for (std::size_t i = part.begin(); i != part.end(); ++i) local(i);
-        });
-    return stop_if_cancelled();
+          for (std::size_t i = part.begin(); i != part.end() && !is_cancelled();) {
+            const std::size_t end = i + std::min(least, part.end() - i);
+            for (; i != end; ++i) local(i);
+          }
+        },
+        loop);
+    if (loop.is_group_execution_cancelled()) throw Cancelled{};
+    return;
   }
   stop_if_cancelled();
 #if defined(__CUDACC__)

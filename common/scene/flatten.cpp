@@ -3,6 +3,8 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <optional>
+#include <stdexcept>
 
 #include "common/error.h"
 
@@ -126,6 +128,34 @@ Mesh flattened(const Scene& scene, const MeshParts& parts) {
     for (const Instance& instance : scene.instances) flat.add(scene.meshes[instance.mesh], &instance);
   }
   return std::move(flat.mesh);
+}
+
+FlatTriangle flat_triangle(const Scene& scene, std::uint32_t number) {
+  std::size_t left = number;
+  const auto find = [&](const Mesh& mesh, const Instance* instance) -> std::optional<FlatTriangle> {
+    if (left >= mesh.triangles.size()) {
+      left -= mesh.triangles.size();
+      return {};
+    }
+    uvec3 t = mesh.triangles[left];
+    if (instance != nullptr && mirrors(instance->transform)) t = uvec3(t.x, t.z, t.y);
+    const auto placed = [&](std::uint32_t vertex) {
+      const vec3& p = mesh.positions[vertex];
+      return instance == nullptr ? p : vec3(apply(instance->transform, dvec3(p)));
+    };
+    std::uint32_t material = mesh.materials.empty() ? 0 : mesh.materials[left];
+    if (instance != nullptr && instance->material >= 0)
+      material = static_cast<std::uint32_t>(instance->material);
+    return FlatTriangle{placed(t.x), placed(t.y), placed(t.z), material, &mesh};
+  };
+  if (scene.instances.empty()) {
+    for (const Mesh& mesh : scene.meshes)
+      if (const auto found = find(mesh, nullptr)) return *found;
+  } else {
+    for (const Instance& instance : scene.instances)
+      if (const auto found = find(scene.meshes[instance.mesh], &instance)) return *found;
+  }
+  throw std::out_of_range(scene.name + " has no triangle " + std::to_string(number));
 }
 
 }  // namespace trilha

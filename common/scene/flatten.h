@@ -18,4 +18,13 @@ struct MeshParts {
 /// before anything is allocated), or a position is no finite float.
 Mesh flattened(const Scene& scene, const MeshParts& parts);
 
+/// One triangle of flattened(scene, …), found again in the scene itself.
+struct FlatTriangle {
+  vec3 a, b, c;  ///< the same to the last bit
+  std::uint32_t material;
+  const Mesh* mesh;
+};
+/// Throws std::out_of_range if there are not that many.
+FlatTriangle flat_triangle(const Scene& scene, std::uint32_t number);
+
 }  // namespace trilha

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -192,15 +193,53 @@ TEST_CASE("images become light and display values, and stay what they are") {
   CHECK(as_light(shown).pixels[0].x == Approx(0.214041).margin(1e-6));
 }
 
-// Catches: a colour map that is not monotonic in lightness, which is what makes it readable without colour.
-TEST_CASE("viridis grows lighter all the way") {
+// Catches: a threshold that is off by one float, a bucket with two of them, NaN or what lies outside [0, 1]
+// looked up elsewhere.
+TEST_CASE("sRGB bytes are looked up as they are computed") {
+  const SrgbBytes& srgb = SrgbBytes::table();
+  const auto differs = [&](std::uint32_t bits) {
+    const auto light = std::bit_cast<float>(bits);
+    return srgb(light) != to_byte(srgb_encoded(light));
+  };
+  std::size_t wrong = 0;
+  for (int byte = 1; byte <= 255; ++byte) {
+    const float least = srgb.least(byte);
+    CHECK(to_byte(srgb_encoded(least)) == byte);
+    CHECK(to_byte(srgb_encoded(std::nextafter(least, 0.0f))) == byte - 1);
+    const auto bits = std::bit_cast<std::uint32_t>(least);
+    for (std::uint32_t k = 0; k <= 8192; ++k) wrong += differs(bits - 4096 + k);
+  }
+  Random random(5);
+  for (std::size_t k = 0; k < effort(10000000); ++k) wrong += differs(random.bits());
+  for (const float light : {0.0f, -0.0f, 1.0f, -1.0f, inf, -inf, nan_value, -nan_value, 1e-45f, 3e38f,
+                            std::nextafter(1.0f, 0.0f), std::nextafter(1.0f, 2.0f), 0x1p-13f})
+    wrong += differs(std::bit_cast<std::uint32_t>(light));
+  CHECK(wrong == 0);
+  CHECK((to_byte(0.499f / 255) == 0 && to_byte(0.501f / 255) == 1 && to_byte(254.501f / 255) == 255));
+  CHECK((to_byte(-1) == 0 && to_byte(nan_value) == 0 && to_byte(inf) == 255 && to_byte(7) == 255));
+}
+
+// Catches: a colour map that is not monotonic in lightness, which is what makes it readable without colour;
+// colours that are not viridis. Those compared with are matplotlib's, in bytes.
+TEST_CASE("viridis is viridis, and grows lighter all the way") {
   float last = -1;
-  for (int k = 0; k <= 100; ++k) {
-    const vec3 c = viridis(static_cast<float>(k) / 100);
+  for (int k = 0; k <= 1000; ++k) {
+    const vec3 c = viridis(static_cast<float>(k) / 1000);
     const float lightness = 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z;
     CHECK(lightness > last);
     last = lightness;
   }
+  const std::pair<int, vec3> known[] = {{0, {68, 1, 84}},
+                                        {64, {59, 82, 139}},
+                                        {128, {33, 145, 140}},
+                                        {192, {94, 201, 98}},
+                                        {255, {253, 231, 37}}};
+  for (const auto& [k, colour] : known) {
+    const vec3 c = viridis(static_cast<float>(k) / 255.0f) * 255.0f;
+    for (int channel = 0; channel < 3; ++channel) CHECK(c[channel] == Approx(colour[channel]).margin(0.5));
+  }
+  CHECK(viridis(-1) == viridis(0));
+  CHECK(viridis(inf) == viridis(1));
   CHECK(viridis(std::nanf("")) == vec3(1, 0, 1));
 }
 
