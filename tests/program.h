@@ -56,15 +56,15 @@ struct Result {
 };
 
 /// Runs a program in the folder; {} in the arguments stands for the folder. A signal may be sent after a
-/// while.
+/// while. The program finds no display: it can open no window on the desktop of whoever runs the tests.
 inline Result run(const std::string& program, const Folder& folder, std::string arguments,
                   double interrupt_after = -1) {
   for (std::size_t at; (at = arguments.find("{}")) != std::string::npos;)
     arguments.replace(at, 2, "'" + folder.path.string() + "'");
   const fs::path out = fs::temp_directory_path() / ("trilha_out" + std::to_string(getpid()));
   const fs::path err = fs::temp_directory_path() / ("trilha_err" + std::to_string(getpid()));
-  const std::string command = "cd '" + folder.path.string() + "' && exec '" + program + "' " + arguments +
-                              " >" + out.string() + " 2>" + err.string();
+  const std::string command = "unset DISPLAY WAYLAND_DISPLAY; cd '" + folder.path.string() + "' && exec '" +
+                              program + "' " + arguments + " >" + out.string() + " 2>" + err.string();
   const auto start = std::chrono::steady_clock::now();
   const pid_t child = fork();
   if (child == 0) {

@@ -4,14 +4,15 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <iostream>
 #include <map>
 #include <set>
 #include <sstream>
 #include <vector>
 
+#include "common/app/words.h"
 #include "common/error.h"
+#include "common/image/files.h"
 #include "common/scene/text.h"
 
 namespace trilha {
@@ -39,20 +40,17 @@ vec3 parse_vector(const std::string& flag, const std::string& text) {
   return result;
 }
 
-void parse_size(const std::string& text, Options& options) {
+/// "WIDTHxHEIGHT"; what is beyond long long is no size.
+std::pair<long long, long long> parse_size(const std::string& flag, const std::string& text) {
   const std::size_t cross = text.find('x');
   const auto width = parsed<long long>(text.substr(0, cross));
   const auto height = cross == std::string::npos ? std::nullopt : parsed<long long>(text.substr(cross + 1));
   if (!width || !height)
-    throw UsageError("--size: '" + text + "' is no size; write WIDTHxHEIGHT, such as 640x480");
-  constexpr long long most = 32768;
-  constexpr long long most_pixels = 1ll << 28;
-  if (*width < 1 || *height < 1 || *width > most || *height > most || *width * *height > most_pixels)
-    throw InputError("--size: an image of " + text + " pixels is refused; each side goes from 1 to " +
-                     std::to_string(most) + ", both together to " + std::to_string(most_pixels) + " pixels");
-  options.width = static_cast<int>(*width);
-  options.height = static_cast<int>(*height);
+    throw UsageError(flag + ": '" + text + "' is no size; write WIDTHxHEIGHT, such as 640x480");
+  return {*width, *height};
 }
+
+std::string text_of(const vec3& v) { return shortest(v.x) + "," + shortest(v.y) + "," + shortest(v.z); }
 
 template <class T>
 void require(const std::string& flag, T value, T low, T high) {
@@ -61,6 +59,9 @@ void require(const std::string& flag, T value, T low, T high) {
   text << flag << ": " << value << " is out of range; it goes from " << low << " to " << high;
   throw InputError(text.str());
 }
+
+constexpr int most_samples = 1 << 24;
+constexpr int most_window_side = 16384;  // what OpenGL draws everywhere
 
 std::string choice_names(const Setting& setting) {
   std::string names;
@@ -92,6 +93,8 @@ void add_settings(CLI::App& app, const Settings& settings) {
 /// A file of flags, "name = value" a line, read after the command line: what that says goes first.
 class ConfigFile {
  public:
+  static constexpr std::size_t most_bytes = 1 << 20, longest_line = 1024;
+
   /// Gives each option what the file says of it, but for those that the command line says. Throws InputError
   /// with file, line and name.
   void read(const std::string& path, CLI::App& app);
@@ -100,39 +103,35 @@ class ConfigFile {
   void check_blame(const std::string& refusal) const;
 
  private:
-  static constexpr std::size_t most_bytes = 1 << 20, longest_line = 1024;
-
-  void take(const CLI::ConfigItem& item, CLI::App& app);
+  std::vector<std::string> values(const std::string& name, std::string_view text) const;
+  std::string quoted(std::string_view& text) const;
+  std::string unquoted(std::string_view text) const;
+  void take(const std::string& name, const std::vector<std::string>& values, CLI::App& app);
 
   std::string path_;
   std::size_t line_ = 0;
   std::map<std::string, std::size_t> lines_;  // of the names that it gave
 };
 
-/// CLI11 takes what is not closed for whatever comes next.
-bool closes_quotes(const std::string& text) {
-  char open = 0;
-  for (const char c : text) {
-    if (open == 0 && c == '#') return true;  // a comment
-    if (open == 0 && (c == '"' || c == '\''))
-      open = c;
-    else if (c == open)
-      open = 0;
-    else if (open != 0 && c == '#')
-      return false;  // CLI11 cuts there
-  }
-  return open == 0;
+std::string_view trimmed(std::string_view text) {
+  constexpr const char* spaces = " \t\r\v\f";
+  const std::size_t begin = text.find_first_not_of(spaces);
+  return begin == text.npos ? "" : text.substr(begin, text.find_last_not_of(spaces) + 1 - begin);
 }
+
+bool is_quote(char c) { return c == '"' || c == '\''; }
+bool ends(std::string_view text) { return text.empty() || text[0] == '#'; }  // but for a comment
+
+bool is_control(unsigned char c) { return (c < 32 && c != '\t') || c == 127; }
 
 void ConfigFile::read(const std::string& path, CLI::App& app) {
   path_ = path;
   std::istringstream text(read_bytes(path, most_bytes));
-  std::string line;
-  while (std::getline(text, line)) {
+  std::string whole;
+  while (std::getline(text, whole)) {
     ++line_;
-    if (line_ == 1 && line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
-    CLI::detail::trim(line);
-    const auto is_control = [](unsigned char c) { return (c < 32 && c != '\t') || c == 127; };
+    if (line_ == 1 && whole.starts_with("\xef\xbb\xbf")) whole.erase(0, 3);
+    const std::string_view line = trimmed(whole);
     if (std::any_of(line.begin(), line.end(), is_control))
       refuse(path_, line_, "a control character; a text file is wanted, a line each");
     if (line.empty() || line[0] == '#' || line[0] == ';') continue;
@@ -142,32 +141,73 @@ void ConfigFile::read(const std::string& path, CLI::App& app) {
                  " are the most");
     if (line[0] == '[')
       refuse(path_, line_, "sections have no meaning here; write name = value, a line each");
-    if (!closes_quotes(line))
-      refuse(path_, line_, "a quote is not closed, or holds a '#'; close it on its line");
-    const std::size_t equals = line.find('=');
-    std::string name = line.substr(0, equals), value = equals == line.npos ? "" : line.substr(equals + 1);
-    CLI::detail::trim(name);
-    CLI::detail::trim(value);
+    const std::size_t end = std::min(line.find_first_of("=#"), line.size());
+    std::string_view name = trimmed(line.substr(0, end));
+    if (name.size() > 1 && is_quote(name.front()) && name.back() == name.front())
+      name = name.substr(1, name.size() - 2);
     if (name.empty()) refuse(path_, line_, "no name before '='; write name = value");
-    if (equals != line.npos && (value.empty() || value[0] == '#'))
-      refuse(path_, line_, in_quotes(name) + " has no value; write name = value");
-    const std::string uncommented = CLI::detail::trim_copy(value.substr(0, value.find('#')));
-    if (!value.empty() && value[0] == '[' && (uncommented.size() < 2 || uncommented.back() != ']'))
-      refuse(path_, line_, "a list is not closed by ']'; close it on its line");
-    std::istringstream one(name + " = " + (equals == line.npos ? "true" : value));
-    CLI::ConfigBase reader;
-    reader.parentSeparator('\0');  // names have no parts
-    for (CLI::ConfigItem& item : reader.from_config(one)) {
-      // CLI11 splits at commas and spaces; here only a list in brackets is more than one text
-      if (item.inputs.size() > 1 && value[0] != '[') item.inputs = {uncommented};
-      take(item, app);
-    }
+    const bool alone = ends(line.substr(end));
+    take(std::string(name),
+         alone ? std::vector<std::string>{"true"} : values(std::string(name), trimmed(line.substr(end + 1))),
+         app);
   }
 }
 
-void ConfigFile::take(const CLI::ConfigItem& item, CLI::App& app) {
-  const std::string name = item.fullname();
-  CLI::Option* option = item.parents.empty() ? app.get_option_no_throw("--" + item.name) : nullptr;
+/// What stands after the '=': one text, or those of a list.
+std::vector<std::string> ConfigFile::values(const std::string& name, std::string_view text) const {
+  if (ends(text)) refuse(path_, line_, in_quotes(name) + " has no value; write name = value");
+  std::vector<std::string> result;
+  if (text[0] != '[') {
+    if (!is_quote(text[0])) return {unquoted(text.substr(0, text.find('#')))};
+    result.push_back(quoted(text));
+    if (!ends(text)) refuse(path_, line_, "text after a quote is closed; put all of it in quotes");
+    return result;
+  }
+  do {
+    text = trimmed(text.substr(1));  // without '[' or ','
+    if (!text.empty() && is_quote(text[0])) {
+      result.push_back(quoted(text));
+    } else {
+      const std::string_view entry = text.substr(0, text.find_first_of(",]#"));
+      text.remove_prefix(entry.size());
+      result.push_back(unquoted(entry));
+    }
+    if (ends(text)) refuse(path_, line_, "a list is not closed by ']'; close it on its line");
+    if (result.back().empty()) refuse(path_, line_, "a list with an empty entry; take it out");
+    if (text[0] != ',' && text[0] != ']')
+      refuse(path_, line_, "text after a quote is closed; put a comma between the entries of a list");
+  } while (text[0] == ',');
+  if (!ends(trimmed(text.substr(1)))) refuse(path_, line_, "text after a list is closed; take it out");
+  return result;
+}
+
+/// Takes a text in quotes from the front, and the spaces after it. Two quotes are one in the text.
+std::string ConfigFile::quoted(std::string_view& text) const {
+  const char quote = text[0];
+  std::string result;
+  for (std::size_t i = 1; i < text.size(); ++i) {
+    if (text[i] == quote) {
+      if (i + 1 == text.size() || text[i + 1] != quote) {
+        text = trimmed(text.substr(i + 1));
+        return result;
+      }
+      ++i;
+    }
+    result += text[i];
+  }
+  refuse(path_, line_, "a quote is not closed; close it on its line");
+}
+
+std::string ConfigFile::unquoted(std::string_view text) const {
+  char open = 0;
+  for (const char c : text)
+    if (is_quote(c) && (open == 0 || open == c)) open = open == 0 ? c : '\0';
+  if (open != 0) refuse(path_, line_, "a quote is not closed; close it on its line");
+  return std::string(trimmed(text));
+}
+
+void ConfigFile::take(const std::string& name, const std::vector<std::string>& values, CLI::App& app) {
+  CLI::Option* option = app.get_option_no_throw("--" + name);
   if (option == nullptr) refuse(path_, line_, in_quotes(name) + " is no flag; --help lists them");
   if (!option->get_configurable())
     refuse(path_, line_, in_quotes(name) + " cannot be said in a file; say it on the command line");
@@ -193,17 +233,17 @@ void ConfigFile::take(const CLI::ConfigItem& item, CLI::App& app) {
   try {
     if (flag) {
       static const std::set<std::string> words{"true", "false", "on", "off", "yes", "no", "1", "0"};
-      if (item.inputs.size() != 1 || words.count(item.inputs[0]) == 0)
+      if (values.size() != 1 || words.count(values[0]) == 0)
         refuse(path_, line_, in_quotes(name) + " is a flag; it takes true or false");
-      option->add_result(option->get_flag_value(item.name, item.inputs[0]));
+      option->add_result(option->get_flag_value(name, values[0]));
     } else {
-      option->add_result(item.inputs);
+      option->add_result(values);
     }
     option->run_callback();
   } catch (const CLI::ParseError&) {
-    std::string values;
-    for (const std::string& value : item.inputs) values += (values.empty() ? "" : ", ") + value;
-    refuse(path_, line_, key + " does not take " + in_quotes(values) + "; --help says what it takes");
+    std::string all;
+    for (const std::string& value : values) all += (all.empty() ? "" : ", ") + value;
+    refuse(path_, line_, key + " does not take " + in_quotes(all) + "; --help says what it takes");
   } catch (const UsageError& error) {
     refuse(path_, line_, error.what());
   } catch (const InputError& error) {
@@ -225,39 +265,75 @@ void print_settings(const Settings& settings) {
   }
 }
 
-}  // namespace
+/// All flags of a chapter's program, and what of them needs a second look once everything has been said.
+class CommandLine {
+ public:
+  CommandLine(Demo& demo, Settings& settings, Options& options);
 
-std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings& settings,
-                                     Options& options) {
-  const auto [program, title] = demo.name();
-  CLI::App app(title + ", a chapter of Trilha", program);
+  CLI::App& app() { return app_; }
+  /// What the file says of flags that the command line does not say.
+  void read_file(const std::string& path) { file_.read(path, app_); }
+  /// The --config file; empty: none.
+  const std::string& config() const { return config_; }
+  /// Checks and keeps what was said. A refusal of what the file said is a refusal of the file.
+  void finish();
+
+ private:
+  void check();
+  void check_parts() const;
+
+  Demo& demo_;
+  Options& options_;
+  CLI::App app_;
+  ConfigFile file_;
+  std::string backend_ = "auto", size_, window_size_, eye_, target_, up_, field_of_view_, heatmap_, config_;
+  bool headless_ = false;
+};
+
+CommandLine::CommandLine(Demo& demo, Settings& settings, Options& options)
+    : demo_(demo), options_(options), app_(demo.name().second + ", a chapter of Trilha", demo.name().first) {
+  const std::string program = demo.name().first;
+  CLI::App& app = app_;
   app.get_formatter()->column_width(34);
-  std::string backend = "auto", size, eye, target, up, heatmap, config;
-  std::optional<float> field_of_view;
-  bool headless = false;
   app.add_option("--scene", options.scene, "name of a scene (--list-scenes), or a file")
       ->type_name("NAME|FILE");
   app.add_flag("--allow-paths", options.allow_paths, "scene files may name files outside their folder");
   app.add_option("--view", options.view, "a view of the scene, by its name")->type_name("NAME");
-  app.add_option("--backend", backend, "where to compute [auto]: auto|cpu|cuda")->type_name("NAME");
-  app.add_flag("--headless", headless, "render to a file, open no window (this version has none yet)");
+  app.add_option("--backend", backend_, "where to compute [auto]: auto|cpu|cuda")->type_name("NAME");
+  app.add_flag("--headless", headless_,
+               "render to a file, open no window; so do --output, --time, --json and --explain");
   app.add_option("--output", options.output, "the image, .png or .hdr [" + program + ".png]")
       ->type_name("FILE");
-  app.add_option("--size", size, "of the image, in pixels [640x480]")->type_name("WxH");
-  auto* samples = app.add_option("--samples", options.samples, "rays a pixel [1]")->type_name("N");
+  app.add_option("--size", size_, "of the image, in pixels [640x480; in a window as it fits]")
+      ->type_name("WxH");
+  auto* samples = app.add_option("--samples", options.samples,
+                                 "rays a pixel [1; in a window " + std::to_string(window_samples) + "]")
+                      ->type_name("N");
+  app.add_flag("--jitter", options.jitter,
+               "even a single sample goes anywhere in its pixel, not through its centre");
   app.add_option("--time", options.seconds, "add samples until so many seconds have passed")
       ->type_name("SECONDS")
       ->excludes(samples);
   app.add_option("--seed", options.seed, "of the random numbers [0]")->type_name("N");
   app.add_option("--threads", options.threads, "of the CPU backend [0: all]")->type_name("N");
-  app.add_option("--eye", eye, "where the camera is")->type_name("X,Y,Z");
-  app.add_option("--target", target, "what the camera looks at")->type_name("X,Y,Z");
-  app.add_option("--up", up, "the direction that is up in the image")->type_name("X,Y,Z");
-  app.add_option("--fov", field_of_view, "vertical field of view, in degrees")->type_name("DEGREES");
-  app.add_option("--heatmap", heatmap, "show what a pixel costs: a measure by name")->type_name("MEASURE");
-  app.add_option("--config", config, "read flags from a file: name = value, a line each")
+  app.add_option("--eye", eye_, "where the camera is")->type_name("X,Y,Z");
+  app.add_option("--target", target_, "what the camera looks at")->type_name("X,Y,Z");
+  app.add_option("--up", up_, "the direction that is up in the image")->type_name("X,Y,Z");
+  app.add_option("--fov", field_of_view_, "vertical field of view, in degrees")->type_name("DEGREES");
+  app.add_option("--heatmap", heatmap_, "show what a pixel costs: a measure by name")->type_name("MEASURE");
+  app.add_option("--config", config_, "read flags from a file: name = value, a line each")
       ->type_name("FILE")
       ->configurable(false);
+  app.add_option("--split", options.split, "open the window split; B's settings come from a file of flags")
+      ->type_name("FILE")
+      ->configurable(false);
+  app.add_flag("--fullscreen", options.fullscreen, "open the window over the whole screen");
+  app.add_option("--screenshot", options.screenshot,
+                 "draw the window as it is once the image is complete, without a display, to a file")
+      ->type_name("FILE.png");
+  app.add_option("--window-size", window_size_, "of the window, in pixels [1280x720]")->type_name("WxH");
+  app.add_option("--scale", options.scale, "how large things are in the window, 0.5 to 4 [0: as the screen]")
+      ->type_name("S");
   app.add_option("--report", options.report, "run the chapter's experiments, write them into a folder")
       ->type_name("DIR");
   app.add_option("--report-budget", options.report_budget, "about how long they may take [600]")
@@ -272,7 +348,7 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
   app.add_flag("--list-settings", options.list_settings, "list the settings with their choices");
   app.add_option_function<std::string>(
          "--list-scenes",
-         [&](const std::string& name) {
+         [&options](const std::string& name) {
            options.list_scenes = true;
            options.listed = name;
          },
@@ -282,69 +358,259 @@ std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings
   app.add_flag("--json", options.json, "print the result as JSON");
   app.add_flag("--quiet", options.quiet, "print nothing but warnings and errors");
   add_settings(app, settings);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // --help
-    throw UsageError(std::string(error.what()) + " (--help lists the flags)");
-  }
+}
 
-  ConfigFile file;
-  if (!config.empty()) file.read(config, app);
-  const auto check = [&] {
-    const bool fixed_scenes = options.stability || (!options.report.empty() && options.sweeps.empty());
-    static const std::set<std::string> have_a_part{
-        "--backend", "--headless",      "--seed",      "--threads", "--config",
-        "--report",  "--report-budget", "--stability", "--json",    "--quiet"};
-    for (const CLI::Option* option : app.get_options())
-      if (fixed_scenes && option->count() > 0 && have_a_part.count(option->get_name()) == 0)
-        throw UsageError(option->get_name() + " has no part in " +
-                         (options.stability ? "--stability" : "--report") +
-                         ", which brings its own scenes and settings; leave it out");
-    if (backend == "cpu") options.backend = Backend::cpu;
-    if (backend == "cuda") options.backend = Backend::cuda;
-    if (!options.backend && backend != "auto")
-      throw UsageError("--backend: '" + backend + "' is none; choose one of auto, cpu, cuda");
-    if (!size.empty()) parse_size(size, options);
-    if (!eye.empty()) options.eye = parse_vector("--eye", eye);
-    if (!target.empty()) options.target = parse_vector("--target", target);
-    if (!up.empty()) options.up = parse_vector("--up", up);
-    if (field_of_view) require("--fov", *field_of_view, 0.001f, 179.0f);
-    options.field_of_view = field_of_view;
-    if (options.samples) require("--samples", *options.samples, 1, 1 << 24);
-    require("--time", options.seconds, 0.0, 1e6);
-    require("--threads", options.threads, 0, 1024);
-    require("--report-budget", options.report_budget, 1.0, 1e6);
-    if (options.sweeps.size() > 2) throw UsageError("--sweep: two settings at most");
-    if (options.stability && !options.sweeps.empty())
-      throw UsageError("--stability and --sweep are two runs; name one of them");
-    if (!heatmap.empty()) {
-      std::string names;
-      bool known = false;
-      for (const std::string& name : demo.heatmaps()) {
-        known = known || name == heatmap;
-        names += (names.empty() ? "" : ", ") + name;
-      }
-      if (!known)
-        throw UsageError("--heatmap: '" + heatmap + "' is no measure of this chapter; it has: " + names);
-      demo.show_heatmap(heatmap);
-    }
+/// Refuses flags that have no part in what the others ask for.
+void CommandLine::check_parts() const {
+  const bool fixed_scenes = options_.stability || (!options_.report.empty() && options_.sweeps.empty());
+  static const std::set<std::string> have_a_part{"--backend", "--headless", "--seed",          "--threads",
+                                                 "--config",  "--report",   "--report-budget", "--stability",
+                                                 "--json",    "--quiet"};
+  for (const CLI::Option* option : app_.get_options())
+    if (fixed_scenes && option->count() > 0 && have_a_part.count(option->get_name()) == 0)
+      throw UsageError(option->get_name() + " has no part in " +
+                       (options_.stability ? "--stability" : "--report") +
+                       ", which brings its own scenes and settings; leave it out");
+  const std::pair<const char*, bool> without_window[] = {
+      {"--headless", headless_},        {"--output", !options_.output.empty()},
+      {"--time", options_.seconds > 0}, {"--json", options_.json},
+      {"--explain", options_.explain},  {"--sweep", !options_.sweeps.empty()},
   };
+  for (const char* flag : {"--split", "--fullscreen", "--screenshot", "--window-size", "--scale"})
+    for (const auto& [other, there] : without_window)
+      if (there && app_.get_option(flag)->count() > 0)
+        throw UsageError(std::string(flag) + " is about the window, and with " + other +
+                         " there is none; leave one of them out");
+  if (options_.fullscreen && !options_.screenshot.empty())
+    throw UsageError(
+        "--fullscreen has no part in --screenshot, which needs no screen; --window-size says "
+        "how large it is");
+}
+
+void CommandLine::check() {
+  check_parts();
+  if (backend_ == "cpu") options_.backend = Backend::cpu;
+  if (backend_ == "cuda") options_.backend = Backend::cuda;
+  if (!options_.backend && backend_ != "auto")
+    throw UsageError("--backend: '" + backend_ + "' is none; choose one of auto, cpu, cuda");
+  if (!size_.empty()) {
+    const auto [width, height] = parse_size("--size", size_);
+    if (const std::string why = why_no_image(width, height); !why.empty()) throw InputError("--size: " + why);
+    options_.width = static_cast<int>(width);
+    options_.height = static_cast<int>(height);
+  }
+  if (!window_size_.empty()) {
+    const auto [width, height] = parse_size("--window-size", window_size_);
+    for (const long long side : {width, height})
+      require("--window-size", side, 1ll, static_cast<long long>(most_window_side));
+    options_.window_width = static_cast<int>(width);
+    options_.window_height = static_cast<int>(height);
+  }
+  if (options_.scale != 0) require("--scale", options_.scale, 0.5f, 4.0f);
+  if (!options_.screenshot.empty() && !options_.screenshot.ends_with(".png"))
+    throw InputError("--screenshot: '" + options_.screenshot + "' does not end in .png; it is a PNG");
+  if (!eye_.empty()) options_.eye = parse_vector("--eye", eye_);
+  if (!target_.empty()) options_.target = parse_vector("--target", target_);
+  if (!up_.empty()) options_.up = parse_vector("--up", up_);
+  if (!field_of_view_.empty()) {
+    options_.field_of_view = parsed<float>(field_of_view_);
+    if (!options_.field_of_view) throw UsageError("--fov: '" + field_of_view_ + "' is no number of degrees");
+    require("--fov", *options_.field_of_view, 0.001f, 179.0f);
+  }
+  if (options_.samples) require("--samples", *options_.samples, 1, most_samples);
+  require("--time", options_.seconds, 0.0, 1e6);
+  require("--threads", options_.threads, 0, 1024);
+  require("--report-budget", options_.report_budget, 1.0, 1e6);
+  if (options_.sweeps.size() > 2) throw UsageError("--sweep: two settings at most");
+  if (options_.stability && !options_.sweeps.empty())
+    throw UsageError("--stability and --sweep are two runs; name one of them");
+  if (!heatmap_.empty()) {
+    std::string names;
+    bool known = false;
+    for (const std::string& name : demo_.heatmaps()) {
+      known = known || name == heatmap_;
+      names += (names.empty() ? "" : ", ") + name;
+    }
+    if (!known)
+      throw UsageError("--heatmap: '" + heatmap_ + "' is no measure of this chapter; it has: " + names);
+    demo_.show_heatmap(heatmap_);
+  }
+  options_.headless =
+      headless_ || !options_.output.empty() || options_.seconds > 0 || options_.json || options_.explain;
+}
+
+void CommandLine::finish() {
   try {
     check();
   } catch (const UsageError& error) {
-    file.check_blame(error.what());
+    file_.check_blame(error.what());
     throw;
   } catch (const InputError& error) {
-    file.check_blame(error.what());
+    file_.check_blame(error.what());
     throw;
   }
+}
+
+/// One of the flags that flags_of gives.
+struct Flag {
+  std::string name;                  // without its dashes
+  std::optional<std::string> value;  // none: it stands alone
+};
+
+std::vector<Flag> parted(const std::vector<std::string>& flags) {
+  std::vector<Flag> result;
+  for (const std::string& text : flags) {
+    if (!text.starts_with("--")) {
+      if (result.empty() || result.back().value) throw InputError(in_quotes(text) + " belongs to no flag");
+      result.back().value = text;
+      continue;
+    }
+    const std::size_t equals = text.find('=');
+    result.push_back({text.substr(2, equals == text.npos ? equals : equals - 2), {}});
+    if (equals != text.npos) result.back().value = text.substr(equals + 1);
+  }
+  return result;
+}
+
+/// Does it hold nothing but letters, digits and the others?
+bool is_plain(const std::string& text, std::string_view others) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [&](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           others.find(c) != others.npos;
+  });
+}
+
+std::string doubled(const std::string& text, char quote) {
+  std::string result;
+  for (const char c : text) result += c == quote ? std::string(2, quote) : std::string(1, c);
+  return result;
+}
+
+}  // namespace
+
+std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings& settings,
+                                     Options& options) {
+  CommandLine line(demo, settings, options);
+  try {
+    line.app().parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return line.app().exit(error);  // --help
+    throw UsageError(std::string(error.what()) + " (--help lists the flags)");
+  }
+  if (!line.config().empty()) line.read_file(line.config());
+  line.finish();
   if (options.list_settings) {
     print_settings(settings);
     return 0;
   }
-  if (options.output.empty()) options.output = program + ".png";
+  if (options.output.empty()) options.output = demo.name().first + ".png";
   return std::nullopt;
+}
+
+void read_config_file(const std::string& path, Demo& demo, Settings& settings, Options& options) {
+  CommandLine line(demo, settings, options);
+  line.read_file(path);
+  try {
+    line.finish();
+  } catch (const UsageError& error) {
+    throw InputError(path + ": " + error.what());
+  }
+}
+
+std::vector<std::string> flags_of(const Options& options, const Settings& settings) {
+  std::vector<std::string> flags;
+  const auto say = [&](const std::string& name, const std::string& value) {
+    if (value.starts_with('-')) return flags.push_back("--" + name + "=" + value);
+    flags.push_back("--" + name);
+    flags.push_back(value);
+  };
+  if (!options.scene.empty()) say("scene", options.scene);
+  if (options.allow_paths) flags.emplace_back("--allow-paths");
+  if (!options.view.empty()) say("view", options.view);
+  if (options.eye) say("eye", text_of(*options.eye));
+  if (options.target) say("target", text_of(*options.target));
+  if (options.up) say("up", text_of(*options.up));
+  if (options.field_of_view) say("fov", shortest(*options.field_of_view));
+  for (const Setting& setting : settings.all()) {
+    if (!setting.changed()) continue;
+    if (setting.kind == Setting::Kind::flag)
+      flags.push_back((setting.get() != 0 ? "--" : "--no-") + setting.name);
+    else
+      say(setting.name, setting.text());
+  }
+  if (options.backend) say("backend", name(*options.backend));
+  if (options.width > 0) say("size", std::to_string(options.width) + "x" + std::to_string(options.height));
+  if (options.samples) say("samples", std::to_string(*options.samples));
+  if (options.jitter) flags.emplace_back("--jitter");
+  if (options.seconds > 0) say("time", shortest(options.seconds));
+  if (options.seed != 0) say("seed", std::to_string(options.seed));
+  return flags;
+}
+
+std::string command_of(const std::string& chapter, const std::vector<std::string>& flags) {
+  std::string command = "./trilha run " + chapter.substr(0, chapter.find('_'));
+  for (const std::string& flag : flags) {
+    command += ' ';
+    if (is_plain(flag, "-_./:,=+@%")) {
+      command += flag;
+      continue;
+    }
+    command += '\'';
+    for (const char c : flag) command += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    command += '\'';
+  }
+  return command;
+}
+
+std::string config_of(const std::vector<std::string>& flags) {
+  std::string text;
+  for (const Flag& flag : parted(flags)) {
+    std::string line = flag.name;
+    if (flag.value) {
+      const std::string& value = *flag.value;
+      if (std::any_of(value.begin(), value.end(), is_control))
+        throw InputError("--" + flag.name + ": " + in_quotes(value) +
+                         " has a control character, which no file of flags can hold; rename it");
+      const char quote = value.find('"') == value.npos ? '"' : value.find('\'') == value.npos ? '\'' : '"';
+      line += is_plain(value, "-_./:,=+@%") ? " = " + value : " = " + (quote + doubled(value, quote)) + quote;
+    }
+    if (line.size() > ConfigFile::longest_line)
+      throw InputError("--" + flag.name + ": " + in_quotes(flag.value.value_or("")) + " has " +
+                       std::to_string(flag.value.value_or("").size()) +
+                       " bytes, too long for a line of a file of flags; shorten it");
+    text += line + "\n";
+  }
+  return text;
+}
+
+Camera camera_of(const Scene& scene, const Options& options, double aspect) {
+  Camera camera = scene.camera;
+  if (!options.view.empty()) {
+    std::string names;
+    const auto named = [&](const View& view) {
+      names += (names.empty() ? "" : ", ") + view.name;
+      return view.name == options.view;
+    };
+    const auto found = std::find_if(scene.views.begin(), scene.views.end(), named);
+    if (found == scene.views.end())
+      throw InputError("--view: " + scene.name + " has no view '" + options.view + "'; it has " +
+                       (names.empty() ? "none" : names));
+    camera = found->camera;
+  }
+  camera = for_aspect(camera, aspect);
+  if (options.eye) camera.eye = *options.eye;
+  if (options.target) camera.target = *options.target;
+  if (options.up) camera.up = *options.up;
+  if (options.field_of_view) camera.field_of_view = *options.field_of_view;
+  return camera;
+}
+
+std::string why_no_image(long long width, long long height) {
+  if (width >= 1 && height >= 1 && width <= most_side && height <= most_side && width * height <= most_pixels)
+    return "";
+  return "an image of " + std::to_string(width) + "x" + std::to_string(height) +
+         " pixels is refused; each side goes from 1 to " + std::to_string(most_side) + ", both together to " +
+         std::to_string(most_pixels) + " pixels";
 }
 
 }  // namespace trilha

@@ -51,31 +51,10 @@ Backend choose_backend(const Options& options) {
   return Backend::cpu;
 }
 
-/// Chooses the camera: the scene's or a view of it, made to suit the image, but for what the user says.
-void choose_camera(Scene& scene, const Options& options) {
-  if (!options.view.empty()) {
-    std::string names;
-    const auto named = [&](const View& view) {
-      names += (names.empty() ? "" : ", ") + view.name;
-      return view.name == options.view;
-    };
-    const auto found = std::find_if(scene.views.begin(), scene.views.end(), named);
-    if (found == scene.views.end())
-      throw InputError("--view: " + scene.name + " has no view '" + options.view + "'; it has " +
-                       (names.empty() ? "none" : names));
-    scene.camera = found->camera;
-  }
-  scene.camera = for_aspect(scene.camera, double(options.width) / options.height);
-  if (options.eye) scene.camera.eye = *options.eye;
-  if (options.target) scene.camera.target = *options.target;
-  if (options.up) scene.camera.up = *options.up;
-  if (options.field_of_view) scene.camera.field_of_view = *options.field_of_view;
-}
-
 Scene load(const Options& options, LoadOptions how) {
   how.allow_paths = options.allow_paths;
   Scene scene = load_scene(options.scene, how);
-  choose_camera(scene, options);
+  scene.camera = camera_of(scene, options, double(options.width) / options.height);
   return scene;
 }
 
@@ -94,7 +73,7 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
       shown = done;
       return !progress.cancelled();
     };
-    const bool jittered = timed || most > 1 || options.jitter;
+    const bool jittered = timed || is_jittered(options, most);
     const bool finished = demo.add_sample(film, {scene.camera, static_cast<std::uint32_t>(outcome.samples),
                                                  jittered, options.seed, band_ms, keep_going});
     if (!finished) break;

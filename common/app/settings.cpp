@@ -11,15 +11,24 @@
 namespace trilha {
 namespace {
 
-std::string number_text(double x) { return shortest(static_cast<float>(x)); }
+/// The shortest text that reads back as x exactly: as a float, or as the whole number that it is.
+std::string number_text(double x, Setting::Kind kind) {
+  return kind == Setting::Kind::integer ? std::to_string(static_cast<long long>(x))
+                                        : shortest(static_cast<float>(x));
+}
+
+template <class T>
+std::from_chars_result read(const std::string& text, T& value) {
+  return std::from_chars(text.data(), text.data() + text.size(), value);
+}
 
 }  // namespace
 
-std::string Setting::text_of(double x) const {
-  if (kind == Kind::flag) return x != 0 ? "true" : "false";
-  if (kind != Kind::choice) return number_text(x);
+std::string Setting::text_of(double value) const {
+  if (kind == Kind::flag) return value != 0 ? "true" : "false";
+  if (kind != Kind::choice) return number_text(value, kind);
   for (const Choice& choice : choices)
-    if (choice.value == x) return choice.name;
+    if (choice.value == value) return choice.name;
   throw std::logic_error(name + " holds a value that is none of its choices");
 }
 
@@ -38,12 +47,14 @@ void Setting::set_text(const std::string& text) const {
     throw UsageError(refused + "is none of its values; choose one of " + names);
   }
   double x = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);
+  const auto [end, error] = read(text, x);
   if (error != std::errc() || end != text.data() + text.size()) throw UsageError(refused + "is no number");
   if (kind == Kind::integer && x != std::floor(x)) throw UsageError(refused + "is no whole number");
+  // rounded once, from the text: a double between could round the other way
+  if (float single = 0; kind == Kind::number && read(text, single).ec == std::errc()) x = single;
   if (!(x >= low && x <= high))
-    throw InputError(refused + "is out of range; it goes from " + number_text(low) + " to " +
-                     number_text(high));
+    throw InputError(refused + "is out of range; it goes from " + number_text(low, kind) + " to " +
+                     number_text(high, kind));
   put(x);
 }
 
@@ -124,6 +135,16 @@ Setting& Settings::add(Setting setting) {
   setting.initial = setting.get();
   settings_.push_back(std::move(setting));
   return settings_.back();
+}
+
+std::vector<std::string> idle_settings(const Settings& settings) {
+  std::vector<std::string> lines;
+  for (const Setting& setting : settings.all()) {
+    if (!setting.changed() || setting.active()) continue;
+    const bool switched_off = setting.kind == Setting::Kind::flag && setting.get() == 0;
+    lines.push_back((switched_off ? "--no-" : "--") + setting.name + " has no effect here: " + setting.only);
+  }
+  return lines;
 }
 
 }  // namespace trilha

@@ -30,16 +30,16 @@ struct Setting {
   std::function<double()> get;  ///< the value now; a choice's is the chosen entry's `value`
   std::function<void(double)> put;
   double initial = 0;
-  std::string group;   ///< under which heading the panel shows it
-  std::string lesson;  ///< the heading of the chapter's README that explains it
+  std::string group;              ///< under which heading the panel shows it
+  std::string lesson;             ///< the heading of the chapter's README that explains it
   std::function<bool()> applies;  ///< empty: always
   std::string only;               ///< when it applies, for people: "only with --shading lambert or normals"
 
   /// Does it change anything, as the other settings are?
   bool active() const { return !applies || applies(); }
-  bool changed() const { return get() != initial; }
+  bool changed() const { return text() != initial_text(); }
 
-  /// The value as a word or number, as the command line takes it.
+  /// The value as a word or number, as the command line takes it: the shortest that reads back exactly.
   std::string text() const { return text_of(get()); }
   std::string initial_text() const { return text_of(initial); }
   /// It changes something only where the condition on other settings holds; `when` says which, for people.
@@ -49,7 +49,7 @@ struct Setting {
   void set_text(const std::string& text) const;
 
  private:
-  std::string text_of(double x) const;
+  std::string text_of(double value) const;
 };
 
 class Settings {
@@ -66,7 +66,7 @@ class Settings {
                   const std::string& help);
   template <class Enum>
   Setting& choice(const std::string& name, Enum& value, std::vector<Choice> choices, Effect effect,
-              const std::string& help) {
+                  const std::string& help) {
     Setting setting = of_kind(Setting::Kind::choice, name, effect, help);
     setting.choices = std::move(choices);
     setting.get = [&value] { return static_cast<double>(value); };
@@ -79,7 +79,8 @@ class Settings {
   const Setting& operator[](const std::string& name) const;
 
   /// All values as texts, in the order of declaration, and back: a set of settings that can be kept, compared
-  /// and given to another demo of the same chapter.
+  /// and given to another demo of the same chapter. Throws std::out_of_range where there are fewer texts than
+  /// settings, else what set_text throws.
   std::vector<std::string> texts() const;
   void set_texts(const std::vector<std::string>& texts) const;
   /// The largest effect of those settings whose texts differ.
@@ -92,5 +93,9 @@ class Settings {
   std::vector<Setting> settings_;
   std::string group_, lesson_;
 };
+
+/// A line for each setting that was changed and changes nothing, as the other settings are: "--smooth has no
+/// effect here: only with --shading lambert or normals".
+std::vector<std::string> idle_settings(const Settings& settings);
 
 }  // namespace trilha

@@ -15,7 +15,8 @@ inline std::string formatted(const char* format, double x) {
 }
 
 /// The shortest text that reads back as the same number.
-inline std::string shortest(float x) {
+template <class T>
+std::string shortest(T x) {
   char text[32];
   const auto result = std::to_chars(text, text + sizeof text, x);
   return {text, result.ptr};

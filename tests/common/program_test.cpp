@@ -37,6 +37,8 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
   write(folder / "range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
   write(folder / "scene.xyz", "nothing");
   write(folder / "bad.ini", "no-such-flag = 3\n");
+  write(folder / "split.ini", "split = good.ini\n");
+  write(folder / "window.ini", "quiet\nscale = 2\noutput = a.png\n");
   fs::create_directory(folder / "folder.obj");
   const std::size_t files = folder.files();
   const struct {
@@ -61,6 +63,7 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
       {"--scene good.obj --samples 1.5", 2, "--samples"},
       {"--scene good.obj --fov 180", 1, "--fov"},
       {"--scene good.obj --fov nan", 1, "--fov"},
+      {"--scene good.obj --fov wide", 2, "--fov"},
       {"--scene good.obj --eye 1,2", 2, "--eye"},
       {"--scene good.obj --eye 1,2,inf", 1, "--eye"},
       {"--scene good.obj --eye 0,0,0 --target 0,0,0", 1, "eye"},
@@ -90,6 +93,24 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
       {"--report r --test plane", 2, "--test"},
       {"--scene good.obj --sweep test=plane,plane", 2, "twice"},
       {"--scene good.obj --sweep test=plane --sweep test=watertight", 2, "twice"},
+      {"--scene good.obj --headless --split bad.ini", 2, "--headless"},
+      {"--scene good.obj --output a.png --split bad.ini", 2, "--split"},
+      {"--scene good.obj --time 1 --fullscreen", 2, "--time"},
+      {"--scene good.obj --json --screenshot a.png", 2, "--json"},
+      {"--scene good.obj --explain --window-size 800x600", 2, "--explain"},
+      {"--scene good.obj --headless --scale 2", 2, "--scale"},
+      {"--scene good.obj --sweep test=plane --screenshot a.png", 2, "--sweep"},
+      {"--stability --split bad.ini", 2, "--stability"},
+      {"--scene good.obj --fullscreen --screenshot a.png", 2, "--window-size"},
+      {"--scene good.obj --screenshot a.jpg", 1, ".png"},
+      {"--scene good.obj --window-size 0x10", 1, "--window-size"},
+      {"--scene good.obj --window-size 16385x10", 1, "16384"},
+      {"--scene good.obj --window-size ten", 2, "--window-size"},
+      {"--scene good.obj --scale 0.25", 1, "0.5"},
+      {"--scene good.obj --scale nan", 1, "--scale"},
+      {"--scene good.obj --scale big", 2, "--scale"},
+      {"--scene good.obj --config split.ini", 1, "split.ini:1"},
+      {"--scene good.obj --config window.ini", 1, "window.ini:2"},
       {"stray", 2, "stray"},
   };
   for (const auto& c : cases) {
@@ -178,8 +199,11 @@ TEST_CASE("the same picture from any folder, any number of threads, any loop") {
   CHECK(image("--samples 3 --no-specialise") == first);
   CHECK(image("--samples 3 --seed 1") != first);
   CHECK(image("--samples 4") != first);
+  CHECK(image("--samples 1") == image(""));
+  CHECK(image("--samples 1 --jitter") != image("--samples 1"));
+  CHECK(image("--samples 3 --jitter") == first);
   CHECK(image("--samples 3 --specialise=false") == first);
-  write(folder / "flags.ini", "samples = 3\nsize = \"100x80\"\ntest = \"watertight\"\n");
+  write(folder / "flags.ini", "samples = 3\nsize = \"100x80\"  # as above\ntest = 'watertight'\n");
   CHECK(image("--config flags.ini") == first);
 }
 
