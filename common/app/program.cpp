@@ -11,6 +11,8 @@
 #include "common/app/explain.h"
 #include "common/app/progress.h"
 #include "common/app/sweep.h"
+#include "common/app/window.h"
+#include "common/app/words.h"
 #include "common/guarded.h"
 #include "common/image/files.h"
 #include "common/scene/library.h"
@@ -90,49 +92,32 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
   outcome.bytes = peak_bytes(stream.backend());
 }
 
-std::string with_unit(double bytes) {
-  char text[32];
-  const double size = std::fabs(bytes);
-  if (size < 1e4)
-    std::snprintf(text, sizeof text, "%.0f B", bytes);
-  else if (size < 1e7)
-    std::snprintf(text, sizeof text, "%.1f kB", bytes / 1e3);
-  else
-    std::snprintf(text, sizeof text, "%.1f MB", bytes / 1e6);
-  return text;
-}
-
 void print_text(const Scene& scene, const Stream& stream, const Options& options, const Outcome& outcome,
                 const std::vector<Saving>& savings) {
   const auto line = [](const char* what) -> std::ostream& {
     std::cout << what << std::string(12 - std::string(what).size(), ' ');
     return std::cout;
   };
-  const auto number = [](double x, int digits) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.*f", digits, x);
-    return std::string(text);
-  };
   line("image") << options.output << ", " << options.width << "x" << options.height << ", " << outcome.samples
                 << (outcome.samples == 1 ? " sample" : " samples") << " a pixel"
                 << (outcome.stopped ? " (stopped before its end)" : "") << "\n";
   line("scene") << scene.name << ", " << scene.triangle_count() << " triangles, "
                 << with_unit(static_cast<double>(bytes(scene))) << ", loaded in "
-                << number(outcome.load_ms, 1) << " ms\n";
+                << fixed(outcome.load_ms, 1) << " ms\n";
   line("machine") << device_name(stream.backend()) << "\n";
-  line("build") << number(outcome.build_ms, 2) << " ms\n";
-  line("render") << number(outcome.render_ms, 1) << " ms";
+  line("build") << fixed(outcome.build_ms, 2) << " ms\n";
+  line("render") << fixed(outcome.render_ms, 1) << " ms";
   for (std::size_t i = 0; i < outcome.stage_ms.size(); ++i)
     std::cout << (i == 0 ? " (" : ", ") << outcome.stage_ms[i].first << " "
-              << number(outcome.stage_ms[i].second, 1);
-  std::cout << (outcome.stage_ms.empty() ? "" : ")") << ", " << number(outcome.mrays_per_s(), 3)
+              << fixed(outcome.stage_ms[i].second, 1);
+  std::cout << (outcome.stage_ms.empty() ? "" : ")") << ", " << fixed(outcome.mrays_per_s(), 3)
             << " Mrays/s\n";
   line("memory") << with_unit(static_cast<double>(outcome.bytes)) << " at most\n";
   for (std::size_t i = 0; i < savings.size(); ++i) {
     const Saving& s = savings[i];
     line(i == 0 ? "left out" : "") << s.omission.what;
     if (s.ms)
-      std::cout << ": " << s.omission.why << "; saved " << with_unit(*s.bytes) << ", " << number(*s.ms, 3)
+      std::cout << ": " << s.omission.why << "; saved " << with_unit(*s.bytes) << ", " << fixed(*s.ms, 3)
                 << " ms";
     std::cout << "\n";
   }
@@ -254,6 +239,19 @@ void run_stability(Demo& demo, const Options& options) {
   say_where(options, "stability.json and pictures in");
 }
 
+/// Shows a window until it is closed. Returns why there can be none, where it cannot be opened. Throws
+/// InputError where the first scene is refused.
+std::string run_window(const MakeDemo& make_demo, const Options& options, const Settings& settings) {
+  std::unique_ptr<Window> window;
+  try {
+    window = std::make_unique<Window>(make_demo, options, settings.texts());
+  } catch (const GraphicsError& error) {
+    return error.what();
+  }
+  while (window->step()) window->session().require_a_scene();
+  return "";
+}
+
 void check_output() {
   std::cout.flush();
   if (!std::cout) throw InputError("standard output: cannot be written; is there room for it?");
@@ -274,7 +272,6 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
     check_output();
     return 0;
   }
-  if (options.width == 0) options.width = 640, options.height = 480;
   set_thread_count(options.threads);
   if (options.stability) {
     catch_interrupts();
@@ -288,6 +285,20 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
     check_output();
     return 0;
   }
+  if (!options.screenshot.empty()) {
+    check_can_write(options.screenshot);
+    catch_interrupts();
+    write_screenshot(make_demo, options, settings.texts());
+    if (!options.quiet) std::cout << "window      " << options.screenshot << "\n";
+    check_output();
+    return 0;
+  }
+  std::string no_window;  // why there is none, although nobody asked to go without
+  if (!options.headless) {
+    no_window = run_window(make_demo, options, settings);
+    if (no_window.empty()) return 0;
+  }
+  if (options.width == 0) options.width = 640, options.height = 480;
   check_can_write(options.output);
   const Stream stream = choose_backend(options);
   const auto start = Clock::now();
@@ -295,6 +306,9 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   const double load_ms = milliseconds_since(start);
   for (const std::string& warning : scene.warnings) warn(warning);
   for (const std::string& warning : demo.not_shown(scene)) warn(warning);
+  for (const std::string& warning : idle_settings(settings)) warn(warning);
+  if (!no_window.empty() && !options.quiet)
+    std::cerr << "no window: " << no_window << "; rendering to " << options.output << " (--headless)\n";
 
   Outcome outcome;
   outcome.load_ms = load_ms;

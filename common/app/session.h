@@ -39,6 +39,8 @@ class Session {
   /// To be called once a frame: takes a scene that has been loaded, and tells the renderer what is wanted if
   /// that has changed.
   void update();
+  /// Throws InputError, as the program ends with, where the first scene could not be loaded.
+  void require_a_scene() const;
   /// The wish that the renderer was told last.
   const Wanted& wanted() const { return wanted_; }
   std::uint64_t generation() const { return generation_; }

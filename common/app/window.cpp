@@ -209,8 +209,7 @@ void write_screenshot(const MakeDemo& make_demo, const Options& options,
     interface.draw(width, height);
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
     if (interrupted()) throw InputError("--screenshot: stopped before the image was complete");
-    if (const std::vector<Notice> notices = session.notices(); !notices.empty() && notices.back().error)
-      throw InputError(notices.back().text);
+    session.require_a_scene();
     drawn = interface.complete() ? drawn + 1 : 0;
   } while (drawn < 4);
   write_image(options.screenshot, screen.image());
