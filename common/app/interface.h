@@ -110,7 +110,7 @@ class Interface {
   void show_picture(const Picture& picture);
   void side_label(int side);
   void divider();
-  void difference(const Picture& picture);
+  void difference();
   void lines_over_image();
   void move_camera();
   void fly();

@@ -52,7 +52,7 @@ void Interface::viewport() {
                         true);
     const bool split = picture_.sides.size() == 2 && session_.is_split();
     if (split && session_.difference_shown()) {
-      difference(picture_);
+      difference();
     } else {
       if (labels_shown_) lines_over_image();
       if (split) divider();
@@ -188,7 +188,7 @@ void Interface::side_label(int side) {
   }
 }
 
-void Interface::difference(const Picture& picture) {
+void Interface::difference() {
   const std::optional<Comparison> comparison = session_.renderer().comparison();
   const bool current = comparison && comparison->image;
   ImDrawList* draw = ImGui::GetWindowDrawList();
