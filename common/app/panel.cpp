@@ -127,7 +127,7 @@ void Interface::setting_row(int side, const Setting& setting) {
   if (setting.changed()) ImGui::PopFont();
   ImGui::PopStyleColor();
   bool hovered = ImGui::IsItemHovered();
-  if (setting.changed() && ImGui::IsItemClicked(ImGuiMouseButton_Right)) text = setting.text_of(setting.initial);
+  if (setting.changed() && ImGui::IsItemClicked(ImGuiMouseButton_Right)) text = setting.initial_text();
   ImGui::TableNextColumn();
   ImGui::BeginDisabled(!active);
   ImGui::SetNextItemWidth(-1);

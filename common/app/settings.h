@@ -41,6 +41,7 @@ struct Setting {
 
   /// The value as a word or number, as the command line takes it: the shortest that reads back exactly.
   std::string text() const { return text_of(get()); }
+  std::string initial_text() const { return text_of(initial); }
   /// It changes something only where the condition on other settings holds; `when` says which, for people.
   void only_if(std::function<bool()> condition, const std::string& when);
   /// Sets the value from such a text. Throws UsageError if it is no such value, InputError if it is out of

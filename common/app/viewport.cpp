@@ -121,7 +121,7 @@ std::string Interface::what_differs(int side, const Frame& frame, const Frame* o
   for (std::size_t i = 0; i < all.size(); ++i) {
     const std::string& value = frame.side.settings[i];
     const Setting& setting = all[i];
-    const bool shown = other != nullptr ? value != other->side.settings[i] : value != setting.text_of(setting.initial);
+    const bool shown = other != nullptr ? value != other->side.settings[i] : value != setting.initial_text();
     if (!shown) continue;
     if (setting.kind == Setting::Kind::flag)
       add((value == "true" ? "" : "not ") + setting.name);

@@ -136,7 +136,7 @@ TEST_CASE("every widget of the panel over its range") {
           CHECK(setting.text() == choice.name);
           REQUIRE(driver.until([&] { return !driver.session().renderer().picture().sides.empty(); }));
         }
-        driver.session().set(side, name, setting.text_of(setting.initial));
+        driver.session().set(side, name, setting.initial_text());
         driver.frames(2);
       } else {
         const PixelRect r = driver.widget(widget);
