@@ -214,8 +214,8 @@ bool RayCaster::add_sample(Film& film, const Camera& camera, std::uint32_t sampl
     rays_ = Buffer<Ray>(stream_.backend(), most);
     hits_ = Buffer<Hit>(stream_.backend(), most);
   }
-  // Until the machine's speed is known, a band has as many tests as a slow one makes in that time.
-  const double slow_tests_per_ms = stream_.backend() == Backend::cuda ? 1e7 : 1e5;
+  // Until the machine's speed is known, a band has as many tests as a slow one makes in that time, about.
+  const double slow_tests_per_ms = stream_.backend() == Backend::cuda ? 2.5e7 : 2.5e5;
   const double indices_per_ms =
       indices_per_ms_ > 0 ? indices_per_ms_ : slow_tests_per_ms / std::max(count_, 1u);
   const double first = std::min(band_ms * indices_per_ms, static_cast<double>(most)) / group;

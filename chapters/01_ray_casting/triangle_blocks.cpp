@@ -32,6 +32,19 @@ inline void test_block(const Triangles<Test, T>& triangles, std::uint32_t block,
   }
 }
 
+/// Tests rays against the blocks begin, …, end−1.
+template <class Test, class T, class Constants>
+void test_chunk(const Triangles<Test, T>& triangles, std::uint32_t begin, std::uint32_t end,
+                const RayOf<T>* rays, const Constants* constants, HitOf<T>* hits, std::size_t n) {
+  for (std::size_t r = 0; r < n; ++r) {
+    const RayOf<T> ray = rays[r];
+    const Constants own = constants[r];
+    HitOf<T> hit = hits[r];
+    for (std::uint32_t block = begin; block < end; ++block) test_block(triangles, block, ray, own, hit);
+    hits[r] = hit;
+  }
+}
+
 /// Batch of rays → their hits, chunk by chunk. Between chunks, a tenth of a millisecond each, it asks whether
 /// to go on: all of them may take minutes.
 template <class Test, class T>
@@ -45,23 +58,16 @@ struct TraceBatch {
     constexpr std::uint32_t chunk = chunk_bytes / (block_lanes * Test::numbers * sizeof(T));
     const auto blocks =
         static_cast<std::uint32_t>((std::size_t{triangles.count} + block_lanes - 1) / block_lanes);
-    const std::size_t first = b * batch, last = std::min(n, first + batch);
+    const std::size_t first = b * batch, count = std::min(n - first, batch);
     decltype(Test::constants(RayOf<T>{})) constants[most_rays];
-    for (std::size_t r = first; r < last; ++r) {
-      constants[r - first] = Test::constants(rays[r]);
-      hits[r] = {};
-      hits[r].t = rays[r].t_max;
+    for (std::size_t r = 0; r < count; ++r) {
+      constants[r] = Test::constants(rays[first + r]);
+      hits[first + r] = {};
+      hits[first + r].t = rays[first + r].t_max;
     }
-    for (std::uint32_t begin = 0; begin < blocks && !is_cancelled(); begin += chunk) {
-      const std::uint32_t end = std::min(blocks, begin + chunk);
-      for (std::size_t r = first; r < last; ++r) {
-        const RayOf<T> ray = rays[r];
-        const auto own = constants[r - first];
-        HitOf<T> hit = hits[r];
-        for (std::uint32_t block = begin; block < end; ++block) test_block(triangles, block, ray, own, hit);
-        hits[r] = hit;
-      }
-    }
+    for (std::uint32_t begin = 0; begin < blocks && !is_cancelled(); begin += chunk)
+      test_chunk(triangles, begin, std::min(blocks, begin + chunk), rays + first, constants, hits + first,
+                 count);
   }
 };
 
@@ -69,9 +75,11 @@ struct TraceBatch {
 
 template <class Test, class T>
 void trace_blocks(const Triangles<Test, T>& triangles, const RayOf<T>* rays, HitOf<T>* hits, std::size_t n) {
-  // Few rays are shared out among all threads, down to eight, which still use a chunk well once it is there.
-  const std::size_t share = n / (8 * static_cast<std::size_t>(thread_count()));
-  const std::size_t batch = std::clamp<std::size_t>(share, 8, most_rays);
+  // Few rays are shared out among the threads, down to sixteen, which still use a chunk well once it is
+  // there.
+  const auto threads = static_cast<std::size_t>(thread_count());
+  const std::size_t batch =
+      threads == 1 ? most_rays : std::clamp<std::size_t>(n / (2 * threads), 16, most_rays);
   for_each(Backend::cpu, (n + batch - 1) / batch, TraceBatch<Test, T>{triangles, rays, hits, n, batch}, 1);
 }
 

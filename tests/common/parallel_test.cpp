@@ -258,6 +258,27 @@ TEST_CASE("bands cover the range once, within their limit, and stop when told") 
   CHECK(bands == 4);
 }
 
+// Catches: a pass or an algorithm that begins on a device although its work was cancelled.
+TEST_CASE("nothing begins on any backend in work that was cancelled") {
+  for (const Backend backend : backends()) {
+    INFO(name(backend));
+    const Stream stream(backend);
+    const std::vector<std::uint32_t> values(1000, 3);
+    const Buffer<std::uint32_t> in(stream, values);
+    Buffer<std::uint32_t> out(stream, values);
+    Cancellation cancellation;
+    CHECK_FALSE(cancellation.run([&] {
+      for_each(stream, values.size(), Square{in.data(), out.data()});
+      stream.synchronize();
+      cancellation.cancel();
+      CHECK_THROWS_AS(for_each(stream, values.size(), Square{out.data(), out.data()}), Cancelled);
+      CHECK_THROWS_AS(exclusive_scan(stream, in.data(), out.data(), values.size()), Cancelled);
+      CHECK_THROWS_AS(reduce(stream, in.data(), values.size(), 0u, Sum{}), Cancelled);
+    }));
+    CHECK(out.to_vector(stream) == std::vector<std::uint32_t>(1000, 9));
+  }
+}
+
 // Catches: CUDA asked for and absent, but not refused.
 TEST_CASE("a backend that is missing is refused with a reason") {
   CHECK(why_unavailable(Backend::cpu).empty());
