@@ -1401,8 +1401,8 @@ struct RenderThread::State {
                      }
                      board->say_changed();
                    });
-    reference->complete = true;
     reference->complete_samples = reference->samples();
+    reference->complete = true;
     reference->technique.reset();
     for (Exposure& exposure : reference->halves) exposure = {};
     for (std::size_t i = 0; i < sides.size(); ++i)
