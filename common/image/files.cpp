@@ -34,10 +34,6 @@ void append(void* context, void* data, int size) {
   bytes.append(static_cast<const char*>(data), static_cast<std::size_t>(size));
 }
 
-unsigned char to_byte(float value) {  // NaN and what lies below 0 become 0
-  return static_cast<unsigned char>(value > 0 ? std::min(value, 1.0f) * 255.0f + 0.5f : 0.0f);
-}
-
 /// The nearest colour that RGBE holds exactly: stb_image_write cuts mantissas off, which would darken every
 /// image by a quarter of a per cent, and takes what is negative or not finite for something else.
 vec3 rounded_to_rgbe(const vec3& light) {

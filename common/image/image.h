@@ -26,6 +26,12 @@ float srgb_decoded(float display);
 /// alike everywhere, where the C library's pow may differ.
 double srgb_decoded_double(double display);
 
+/// A display value as a byte: 255 times as much, rounded; NaN and what lies below 0 become 0, what lies above 1
+/// becomes 255.
+TRILHA_HD inline std::uint8_t to_byte(float display) {
+  return static_cast<std::uint8_t>(display > 0 ? min(display, 1.0f) * 255.0f + 0.5f : 0.0f);
+}
+
 /// The image as light: display values are clamped to [0, 1] and decoded, light stays as it is.
 Image as_light(Image image);
 /// The image as it is shown: light is clamped to [0, 1] and encoded (NaN is black), display values stay as
