@@ -27,14 +27,19 @@ function(trilha_chapter)
   target_link_libraries(${name} PRIVATE chapter_${name})
 endfunction()
 
-# trilha_test(NAME PASSES … PLAIN … LINK … [ALONE]): a Catch2 program; ctest knows every test case of it by its own
-# name. A case that finds no GPU says so (require_cuda) and is reported as skipped. ALONE: nothing runs beside it.
+# trilha_test(NAME PASSES … PLAIN … LINK … [ALONE] [DEEP]): a Catch2 program; ctest knows every test case of it by its
+# own name. A case that finds no GPU says so (require_cuda) and is reported as skipped. ALONE: nothing runs beside it.
+# DEEP: only `./trilha test --deep` runs it.
 function(trilha_test name)
-  cmake_parse_arguments(arg "ALONE" "" "PASSES;PLAIN;LINK" ${ARGN})
+  cmake_parse_arguments(arg "ALONE;DEEP" "" "PASSES;PLAIN;LINK" ${ARGN})
   add_executable(${name})
   trilha_sources(${name} PASSES ${arg_PASSES} PLAIN ${arg_PLAIN})
   target_link_libraries(${name} PRIVATE trilha_testing ${arg_LINK})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
+  set(label "")
+  if(arg_DEEP)
+    set(label LABELS deep)
+  endif()
   catch_discover_tests(${name} TEST_PREFIX "${name}:"
-    PROPERTIES SKIP_REGULAR_EXPRESSION "TRILHA SKIPPED" TIMEOUT 300 RUN_SERIAL ${arg_ALONE})
+    PROPERTIES SKIP_REGULAR_EXPRESSION "TRILHA SKIPPED" TIMEOUT 300 RUN_SERIAL ${arg_ALONE} ${label})
 endfunction()
