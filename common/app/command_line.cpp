@@ -60,7 +60,6 @@ void require(const std::string& flag, T value, T low, T high) {
   throw InputError(text.str());
 }
 
-constexpr int most_samples = 1 << 24;
 constexpr int most_window_side = 16384;  // what OpenGL draws everywhere
 
 std::string choice_names(const Setting& setting) {

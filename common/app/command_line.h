@@ -33,7 +33,7 @@ struct Options {
   std::string split;  ///< a file of flags: the window opens split, B's settings come from there
   bool fullscreen = false;
   std::string screenshot;                   ///< the window is drawn without a display, to this PNG; empty: no
-  int window_width = 0, window_height = 0;  ///< 0: 1280×720
+  int window_width = 0, window_height = 0;  ///< 0: to suit --size, else 1280×720
   float scale = 0;                          ///< of everything in the window; 0: as the screen has it
   bool explain = false, json = false, quiet = false, list_settings = false, list_scenes = false;
   std::string listed;  ///< the scene or collection that --list-scenes names; empty for all
@@ -69,8 +69,8 @@ void read_config_file(const std::string& path, Demo& demo, Settings& settings, O
 /// image, but for what the options say. Throws InputError where the scene has no such view.
 Camera camera_of(const Scene& scene, const Options& options, double aspect);
 
-/// A window's samples a pixel, unless said.
-constexpr int window_samples = 1024;
+/// A pixel's samples in a window, unless said, and the most anywhere.
+constexpr int window_samples = 1024, most_samples = 1 << 24;
 
 /// Does each sample go anywhere in its pixel? Else a pixel's only one goes through its centre.
 inline bool is_jittered(const Options& options, int samples) { return options.jitter || samples > 1; }
