@@ -62,7 +62,6 @@ Interface::Interface(Session& session, float scale) : session_(session), scale_(
   ImGui::CreateContext();
   ImGuiIO& io = ImGui::GetIO();
   io.IniFilename = nullptr;  // the layout is fixed: nothing to remember
-  io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
   io.ConfigWindowsMoveFromTitleBarOnly = true;
   ImGui_ImplOpenGL3_Init("#version 450");
   for (auto& texture : textures_) texture = std::make_unique<FrameTexture>();

@@ -312,7 +312,7 @@ void Session::load_next() {
   if (!loading_.empty() && loading_.back().number == asked_->number) return;
   std::promise<std::shared_ptr<const Scene>> promise;
   std::future<std::shared_ptr<const Scene>> scene = promise.get_future();
-  const auto load = [name = asked_->options.scene, parts = asked_->parts, changed = changed_,
+  auto load = [name = asked_->options.scene, parts = asked_->parts, changed = changed_,
                      promise = std::move(promise)]() mutable {
     try {
       promise.set_value(std::make_shared<const Scene>(load_scene(name, parts)));
@@ -469,3 +469,153 @@ std::vector<std::string> Session::presets() const {
   }
 }
 
+/// Returns whether it was written. Throws InputError.
+bool Session::save(const fs::path& folder, const std::string& name, const std::string& what,
+                   const std::vector<std::string>& flags, bool overwrite) {
+  check_name(name, what);
+  const fs::path file = file_of(folder, name);
+  std::error_code error;
+  if (!overwrite && fs::exists(file, error))
+    throw InputError("there is a " + what + " called " + in_quotes(name) + " already; replace it knowingly, or choose another name");
+  const std::string text = config_of(flags);
+  make_folder(folder.string());
+  write_whole_file(file.string(), text);
+  notify("Kept in " + file.string());
+  return true;
+}
+
+/// Throws InputError where there is none, or it cannot be removed.
+bool Session::remove(const fs::path& folder, const std::string& name, const std::string& what) {
+  check_name(name, what);
+  const fs::path file = file_of(folder, name);
+  std::error_code error;
+  if (fs::remove(file, error)) return true;
+  throw InputError(file.string() + ": cannot be removed: " + (error ? error.message() : "there is no such " + what));
+}
+
+bool Session::save_preset(int side, const std::string& name, bool overwrite) {
+  const std::string failure =
+      reason_of([&] { save(presets_folder(), name, "preset", flags(side), overwrite); });
+  if (!failure.empty()) notify(failure, true);
+  return failure.empty();
+}
+
+void Session::load_preset(int side, const std::string& name) {
+  const std::string failure = reason_of([&] {
+    check_name(name, "preset");
+    load_config(side, file_of(presets_folder(), name));
+  });
+  if (!failure.empty()) notify(failure, true);
+}
+
+void Session::remove_preset(const std::string& name) {
+  const std::string failure = reason_of([&] { remove(presets_folder(), name, "preset"); });
+  if (!failure.empty()) notify(failure, true);
+}
+
+/// Throws InputError with file and line.
+Session::Said Session::read_flags(const fs::path& file) const {
+  const std::unique_ptr<Demo> demo = make_demo_();
+  Settings settings;
+  demo->declare_settings(settings);
+  Said said;
+  said.file = file.string();
+  read_config_file(said.file, *demo, settings, said.options);
+  if (said.options.backend)
+    if (const std::string why = why_unavailable(*said.options.backend); !why.empty())
+      throw InputError(said.file + ": --backend " + trilha::name(*said.options.backend) + ": " + why +
+                       "; a preset without it takes what is there");
+  said.settings = settings.texts();
+  said.reads = demo->reads();
+  return said;
+}
+
+void Session::load_config(int side, const fs::path& file) {
+  const std::string failure = reason_of([&] {
+    const Said said = read_flags(file);
+    if (side == 1)
+      take(said, 1);
+    else
+      take_with_scene(said);
+  });
+  if (!failure.empty()) notify(failure, true);
+}
+
+/// Settings and backend, and of A what belongs to no side.
+void Session::take(const Said& said, int side) {
+  this->side(side).settings.set_texts(said.settings);
+  if (said.options.backend) this->side(side).backend = *said.options.backend;
+  if (side != 0) return;
+  if (said.options.samples) samples_ = *said.options.samples;
+  options_.jitter = said.options.jitter;
+  options_.seed = said.options.seed;
+}
+
+/// All at once, when the scene is there: settings that meet another scene first would be rendered for nothing.
+void Session::take_with_scene(const Said& said) {
+  const std::string scene = said.options.scene.empty() ? options_.scene : lasting_name(said.options.scene);
+  if (scene_ && scene == options_.scene) {
+    Options options = options_;
+    if (names_camera(said.options)) copy_camera(said.options, options);
+    use_camera(options);  // throws before anything has changed
+    return take(said, 0);
+  }
+  Options options = options_;
+  options.scene = scene;
+  options.allow_paths = said.options.allow_paths || options.allow_paths;
+  copy_camera(said.options, options);
+  ask({options, both(needed(), said.reads), false, said, 0});
+}
+
+// ---- commands and files ------------------------------------------------------
+
+std::vector<std::string> Session::flags(int side) const {
+  Options options = options_;
+  options.backend = this->side(side).backend;
+  options.samples = samples_;
+  return flags_of(options, this->side(side).settings);
+}
+
+std::string Session::command(int side) const { return command_of(chapter_, flags(side)); }
+
+void Session::save_image(int side) {
+  renderer_->image(side, [this](const Image& image, int samples, const std::string& error) {
+    const std::string failure = !error.empty() ? error : reason_of([&] {
+      const std::string file = free_name(chapter_);
+      write_image(file, image);
+      notify("The image, " + counted(static_cast<std::uint64_t>(samples), "sample") + " a pixel, is in " + file);
+    });
+    if (!failure.empty()) notify(failure, true);
+    changed_();
+  });
+}
+
+void Session::take_file(const std::string& path) {
+  if (fs::path(path).extension() == ".ini")
+    load_config(0, path);
+  else
+    open_scene(path);
+}
+
+void Session::require_a_scene() const {
+  if (scene_ || asked_) return;
+  for (const Notice& notice : notices())
+    if (notice.error) throw InputError(notice.text);
+}
+
+void Session::notify(const std::string& text, bool error) {
+  const std::lock_guard lock(notices_mutex_);
+  constexpr std::size_t most = 16;
+  if (notices_.size() >= most) notices_.erase(notices_.begin());
+  notices_.push_back({text, error});
+}
+
+std::vector<Notice> Session::notices(std::chrono::steady_clock::time_point now) const {
+  const std::lock_guard lock(notices_mutex_);
+  std::vector<Notice> fresh;
+  for (const Notice& notice : notices_)
+    if (now - notice.at < (notice.error ? error_stays : notice_stays)) fresh.push_back(notice);
+  return fresh;
+}
+
+}  // namespace trilha
