@@ -150,6 +150,7 @@ void Interface::layout() {
   if (clean_) return;
   top_bar();
   if (panel_shown_) panel();
+  if (pixel_) pixel_card();
   if (help_shown_) help();
   notices();
 }
@@ -227,6 +228,7 @@ void Interface::top_bar() {
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoBringToFrontOnFocus);
   ImGui::PopStyleVar(3);
+  ImGui::PushAllowKeyboardFocus(false);
   ImGui::AlignTextToFramePadding();
   ImGui::PushFont(fonts_.strong);
   ImGui::TextUnformatted(session_.title().c_str());
@@ -242,6 +244,7 @@ void Interface::top_bar() {
     ImGui::SetNextWindowSizeConstraints({units(240), 0}, {units(620), static_cast<float>(height_) - below.y - units(8)});
     if (ImGui::BeginPopup(name)) {
       body();
+      if (ImGui::IsKeyPressed(keys::escape, false)) ImGui::CloseCurrentPopup();
       ImGui::EndPopup();
     }
     ImGui::SameLine();
@@ -268,7 +271,8 @@ void Interface::top_bar() {
   const float room = static_cast<float>(width_) - ImGui::GetItemRectMax().x - units(24);
   const float wide = std::min(units(300), room);
   if (wide > units(80)) {
-    ImGui::SameLine(static_cast<float>(width_) - wide - units(12));
+    const float text = std::min(wide, ImGui::CalcTextSize(what.c_str()).x);
+    ImGui::SameLine(static_cast<float>(width_) - std::max(text, units(120)) - units(12));
     const ImVec2 at = ImGui::GetCursorScreenPos();
     const float height = ImGui::GetFrameHeight();
     ImDrawList* draw = ImGui::GetWindowDrawList();
@@ -281,6 +285,7 @@ void Interface::top_bar() {
     ImGui::TextUnformatted(what.c_str());
     ImGui::PopClipRect();
   }
+  ImGui::PopAllowKeyboardFocus();
   ImGui::End();
 }
 

@@ -102,7 +102,6 @@ class Interface {
   void memory_rows();
   void left_out();
   void error_section();
-  void pixel_section();
   bool heading(const char* text, bool open = true);
 
   // viewport.cpp
@@ -112,6 +111,7 @@ class Interface {
   void divider();
   void difference();
   void lines_over_image();
+  void pixel_card();
   void move_camera();
   void fly();
   void click(int x, int y);

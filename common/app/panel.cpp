@@ -47,12 +47,16 @@ void Interface::panel() {
                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoBringToFrontOnFocus);
   ImGui::PopStyleVar(2);
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {units(8), units(4)});
+  ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, {units(4), units(1.5f)});
+  ImGui::PushAllowKeyboardFocus(false);  // Tab goes to the other side, not to the next slider
   side_ = std::min(side_, session_.side_count() - 1);
   if (session_.is_split()) side_tabs();
   settings_of(side_);
   figures();
   error_section();
-  if (pixel_) pixel_section();
+  ImGui::PopAllowKeyboardFocus();
+  ImGui::PopStyleVar(2);
   ImGui::End();
 }
 
@@ -383,27 +387,6 @@ void Interface::error_section() {
     curves.push_back(std::move(curve));
   }
   log_log_plot("errors", {-1, units(200)}, "render time (ms)", "RMSE", curves, activity.reference_floor, "the reference's own");
-}
-
-void Interface::pixel_section() {
-  const std::shared_ptr<Pixel> pixel = pixel_;
-  const std::lock_guard lock(pixel->mutex);
-  const std::string title = "Pixel " + std::to_string(pixel->x) + ", " + std::to_string(pixel->y) +
-                            (session_.is_split() ? std::string(", side ") + side_names[pixel->side] : "") + "###pixel";
-  if (!heading(title.c_str())) return;
-  if (!pixel->answered) return ImGui::TextDisabled("is being asked …");
-  if (!ImGui::BeginTable("pixel", 2)) return;
-  ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, units(104));
-  for (const auto& [what, value] : pixel->inspection.facts) {
-    ImGui::TableNextRow();
-    ImGui::TableNextColumn();
-    ImGui::TextDisabled("%s", what.c_str());
-    ImGui::TableNextColumn();
-    ImGui::TextWrapped("%s", value.c_str());
-  }
-  ImGui::EndTable();
-  if (ImGui::Button("Look at it (F)", {-1, 0})) pixel->focus = true;
-  mark("button Look at it");
 }
 
 }  // namespace trilha

@@ -128,9 +128,10 @@ std::string Interface::what_differs(int side, const Frame& frame, const Frame* o
     else
       add(setting.name + " " + value);
   }
-  if (other == nullptr || frame.side.backend != other->side.backend) add(name(frame.side.backend));
-  if (!text.empty()) return text;
-  return other != nullptr ? "the same settings on both sides" : "all as declared";
+  if (other == nullptr && text.empty()) add("settings as they are by default");
+  if (other == nullptr || frame.side.backend != other->side.backend)
+    add(frame.side.backend == Backend::cpu ? "CPU" : "CUDA");
+  return text.empty() ? "the same settings on both sides" : text;
 }
 
 void Interface::side_label(int side) {
@@ -252,6 +253,48 @@ void Interface::lines_over_image() {
   const ImVec2 centre{static_cast<float>(image_.x + x), static_cast<float>(image_.y + y)};
   draw->AddCircle(centre, units(5), IM_COL32(12, 14, 18, 200), 0, units(4));
   draw->AddCircle(centre, units(5), colours::ray, 0, units(1.75f));
+}
+
+/// What the pixel's ray met, at the lower right of the image.
+void Interface::pixel_card() {
+  const std::shared_ptr<Pixel> pixel = pixel_;
+  const std::lock_guard lock(pixel->mutex);
+  ImGui::SetNextWindowPos({static_cast<float>(image_.x + image_.width) - units(12),
+                           static_cast<float>(image_.y + image_.height) - units(12)},
+                          ImGuiCond_Always, {1, 1});
+  ImGui::SetNextWindowSizeConstraints({units(200), 0}, {units(460), static_cast<float>(image_.height) - units(24)});
+  ImGui::SetNextWindowBgAlpha(0.92f);
+  ImGui::Begin("pixel", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoSavedSettings);
+  ImGui::PushAllowKeyboardFocus(false);
+  const std::string title = "Pixel " + std::to_string(pixel->x) + ", " + std::to_string(pixel->y) +
+                            (session_.is_split() ? std::string(", side ") + side_names[pixel->side] : "");
+  ImGui::PushFont(fonts_.strong);
+  ImGui::TextUnformatted(title.c_str());
+  ImGui::PopFont();
+  if (!pixel->answered) ImGui::TextDisabled("is being asked …");
+  ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, {units(4), units(1)});
+  if (pixel->answered && ImGui::BeginTable("facts", 2, ImGuiTableFlags_SizingFixedFit)) {
+    for (const auto& [what, value] : pixel->inspection.facts) {
+      ImGui::TableNextRow();
+      ImGui::TableNextColumn();
+      ImGui::TextDisabled("%s", what.c_str());
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(value.c_str());
+    }
+    ImGui::EndTable();
+  }
+  ImGui::PopStyleVar();
+  ImGui::BeginDisabled(!pixel->inspection.point);
+  if (ImGui::Button("Look at it (F)")) pixel->focus = true;
+  mark("button Look at it");
+  ImGui::EndDisabled();
+  ImGui::SameLine();
+  if (ImGui::Button("Close (Esc)")) pixel_.reset();
+  mark("button Close pixel");
+  ImGui::PopAllowKeyboardFocus();
+  ImGui::End();
 }
 
 void Interface::click(int x, int y) {

@@ -140,6 +140,27 @@ Window::~Window() {
   if (state_ && state_->interface) ImGui_ImplGlfw_Shutdown();
 }
 
+void Window::draw(Image* copy) {
+  State& s = *state_;
+  s.drawn_at = Clock::now();
+  int width = 0, height = 0, window_width = 0, window_height = 0;
+  glfwGetFramebufferSize(s.window.get(), &width, &height);
+  if (width <= 0 || height <= 0 || glfwGetWindowAttrib(s.window.get(), GLFW_ICONIFIED)) {
+    s.session->set_size(0, 0);  // nobody sees it
+    return s.session->update();
+  }
+  glfwGetWindowSize(s.window.get(), &window_width, &window_height);
+  s.interface->set_scale(s.screen_scale());
+  ImGuiIO& io = ImGui::GetIO();
+  ImGui_ImplGlfw_NewFrame();
+  // the interface counts in pixels, where a screen counts in something else
+  const float x = static_cast<float>(width) / static_cast<float>(std::max(window_width, 1));
+  if (io.MousePos.x > -1e30f) io.MousePos = {io.MousePos.x * x, io.MousePos.y * x};
+  s.interface->draw(width, height);
+  if (copy) *copy = read_pixels(0, 0, width, height);
+  glfwSwapBuffers(s.window.get());
+}
+
 bool Window::step() {
   State& s = *state_;
   // no faster than a screen shows, and no slower than every figure on it wants
@@ -153,23 +174,7 @@ bool Window::step() {
   if (rest > 0) std::this_thread::sleep_for(std::chrono::duration<double>(rest));
   glfwPollEvents();
   if (glfwWindowShouldClose(s.window.get()) || s.interface->wants_to_close()) return false;
-  s.drawn_at = Clock::now();
-  int width = 0, height = 0, window_width = 0, window_height = 0;
-  glfwGetFramebufferSize(s.window.get(), &width, &height);
-  if (width <= 0 || height <= 0 || glfwGetWindowAttrib(s.window.get(), GLFW_ICONIFIED)) {
-    s.session->set_size(0, 0);  // nobody sees it
-    s.session->update();
-    return true;
-  }
-  glfwGetWindowSize(s.window.get(), &window_width, &window_height);
-  s.interface->set_scale(s.screen_scale());
-  ImGuiIO& io = ImGui::GetIO();
-  ImGui_ImplGlfw_NewFrame();
-  // the interface counts in pixels, where a screen counts in something else
-  const float x = static_cast<float>(width) / static_cast<float>(std::max(window_width, 1));
-  if (io.MousePos.x > -1e30f) io.MousePos = {io.MousePos.x * x, io.MousePos.y * x};
-  s.interface->draw(width, height);
-  glfwSwapBuffers(s.window.get());
+  draw(nullptr);
   if (s.interface->take_fullscreen()) s.fullscreen(glfwGetWindowMonitor(s.window.get()) == nullptr);
   if (s.interface->take_window_shot()) {
     const std::string file = free_name(s.session->chapter() + "_window");
@@ -189,10 +194,9 @@ void Window::resize(int width, int height) { glfwSetWindowSize(state_->window.ge
 void* Window::handle() { return state_->window.get(); }
 
 Image Window::image() {
-  int width = 0, height = 0;
-  glfwGetFramebufferSize(state_->window.get(), &width, &height);
-  glReadBuffer(GL_FRONT);
-  return read_pixels(0, 0, width, height);
+  Image image;
+  draw(&image);  // what was shown need not be there any more
+  return image;
 }
 
 void write_screenshot(const MakeDemo& make_demo, const Options& options,

@@ -25,12 +25,15 @@ class Window {
 
   Session& session();
   Interface& interface();
-  /// What is on the screen, in pixels of the framebuffer.
+  /// Draws once more, and returns what is then on the screen, in pixels of the framebuffer; empty where the
+  /// window is minimised.
   Image image();
   void resize(int width, int height);  ///< in units of the screen
   void* handle();                      ///< the GLFWwindow
 
  private:
+  void draw(Image* copy);
+
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -122,7 +122,7 @@ class Driver {
 
  private:
   OwnConfiguration configuration_;
-  PrivateDisplay display_{3840, 2160};
+  VirtualDisplay display_;
   Options options_;
   std::unique_ptr<Window> window_;
   std::unique_ptr<Hand> hand_;

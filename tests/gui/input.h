@@ -42,7 +42,7 @@ class Hand {
   }
 
  private:
-  Display* display_;
+  ::Display* display_;
 };
 
 }  // namespace trilha::testing

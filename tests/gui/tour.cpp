@@ -43,7 +43,7 @@ class Tour {
   }
 
   /// Glides to a place of the window, as a hand does.
-  void go(ImVec2 to, double seconds = 0.7) {
+  void glide(ImVec2 to, double seconds = 0.7) {
     const ImVec2 from = mouse_;
     const int steps = std::max(1, static_cast<int>(seconds * frames_a_second));
     for (int i = 1; i <= steps; ++i) {
@@ -56,7 +56,7 @@ class Tour {
     const auto found = interface_.widgets().find(widget);
     if (found == interface_.widgets().end()) throw InputError("the window has no " + widget);
     const PixelRect& r = found->second;
-    go({static_cast<float>(r.x) + across * static_cast<float>(r.width),
+    glide({static_cast<float>(r.x) + across * static_cast<float>(r.width),
         static_cast<float>(r.y) + 0.5f * static_cast<float>(r.height)});
   }
   void press(bool down) {
@@ -108,9 +108,9 @@ int run(int argc, char** argv) {
   demo->declare_settings(settings);
   Tour tour(argv[1], options, settings.texts());
   tour.wait(1);
-  tour.go({300, 330});
+  tour.glide({300, 330});
   tour.press(true);
-  tour.go({420, 300}, 1.5);
+  tour.glide({420, 300}, 1.5);
   tour.press(false);
   tour.wait(0.8);
   tour.click("setting A shading");
@@ -125,14 +125,14 @@ int run(int argc, char** argv) {
   tour.wait(1.5);
   tour.go("divider");
   tour.press(true);
-  tour.go({180, 340}, 1);
-  tour.go({520, 340}, 1.5);
-  tour.go({346, 340}, 0.8);
+  tour.glide({180, 340}, 1);
+  tour.glide({520, 340}, 1.5);
+  tour.glide({346, 340}, 0.8);
   tour.press(false);
   tour.click("button Difference");
   tour.wait(1.5);
   tour.click("button Difference");
-  tour.go({250, 300});
+  tour.glide({250, 300});
   tour.press(true), tour.press(false);
   tour.wait(1.5);
   return 0;
