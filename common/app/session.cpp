@@ -17,7 +17,10 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
-constexpr auto notice_stays = 6s, error_stays = 12s;
+bool is_fresh(const Notice& notice, std::chrono::steady_clock::time_point now) {
+  return now - notice.at < (notice.error ? 12s : 6s);
+}
+
 /// Scenes that are loaded at the same time: the newest does not wait for one that nobody wants any more, and
 /// a hand that runs down the list of scenes does not load them all.
 constexpr std::size_t most_loading = 2;
@@ -32,7 +35,9 @@ std::string lasting_name(const std::string& scene) {
         return scene;
   } catch (const InputError&) {  // no library: files alone
   }
-  return fs::exists(scene, error) ? fs::absolute(scene).lexically_normal().string() : scene;
+  if (!fs::exists(scene, error)) return scene;  // to be refused in the loader's words
+  const fs::path file = fs::absolute(scene, error);
+  return error ? scene : file.lexically_normal().string();
 }
 
 bool covers(const LoadOptions& parts, const LoadOptions& wanted) {
@@ -77,7 +82,7 @@ void check_name(const std::string& name, const std::string& what) {
   const auto refuse_name = [&](const std::string& why) {
     throw InputError("a " + what + " cannot be called " + in_quotes(name) + ": " + why);
   };
-  if (name.find_first_not_of(' ') == name.npos) refuse_name("give it a name");
+  if (name.find_first_not_of(' ') == name.npos) refuse_name("it is blank; write a word");
   if (name.size() > longest)
     refuse_name("it has " + std::to_string(name.size()) + " bytes; " + std::to_string(longest) +
                 " are the most");
@@ -153,16 +158,30 @@ std::string free_name(const std::string& chapter) {
   }
 }
 
-/// What an exception says that work on another thread ended with, in one line.
-std::string reason_of(const std::function<void()>& rethrow) {
+/// Flags that a window cannot do: the first that the options have, or nothing.
+std::string beyond_windows(const Options& o) {
+  if (o.stability) return "--stability";
+  if (!o.report.empty()) return "--report";
+  if (!o.sweeps.empty()) return "--sweep";
+  if (o.list_scenes) return "--list-scenes";
+  if (o.list_settings) return "--list-settings";
+  if (!o.output.empty()) return "--output";
+  if (o.seconds > 0) return "--time";
+  if (o.json) return "--json";
+  if (o.explain) return "--explain";
+  return o.headless ? "--headless" : "";
+}
+
+/// Does it, and returns nothing; or one line that says why it could not be done.
+std::string failure_of(const std::function<void()>& work) {
   try {
-    rethrow();
+    work();
+    return "";
   } catch (const std::bad_alloc&) {
     return "not enough memory; a smaller scene needs less";
   } catch (const std::exception& error) {
     return error.what();
   }
-  return "";
 }
 
 }  // namespace
@@ -257,16 +276,13 @@ void Session::reset(int side) {
 }
 
 void Session::set(int side, const std::string& name, const std::string& text) {
-  try {
-    this->side(side).settings[name].set_text(text);
-  } catch (const std::exception& error) {
-    notify(error.what(), true);
-  }
+  attempt([&] { this->side(side).settings[name].set_text(text); });
 }
 
 void Session::set_size(int width, int height) {
+  if (width <= 0 || height <= 0) width = height = 0;
   if (width == width_ && height == height_) return;
-  if (width != 0 || height != 0) {
+  if (width != 0) {
     if (const std::string why = why_no_image(width, height); !why.empty()) return notify(why, true);
     options_.width = width;
     options_.height = height;
@@ -313,7 +329,7 @@ void Session::load_next() {
   std::promise<std::shared_ptr<const Scene>> promise;
   std::future<std::shared_ptr<const Scene>> scene = promise.get_future();
   auto load = [name = asked_->options.scene, parts = asked_->parts, changed = changed_,
-                     promise = std::move(promise)]() mutable {
+               promise = std::move(promise)]() mutable {
     try {
       promise.set_value(std::make_shared<const Scene>(load_scene(name, parts)));
     } catch (...) {
@@ -337,9 +353,10 @@ void Session::take_loaded() {
     const Request request = std::move(*asked_);
     asked_.reset();
     opening_.clear();
-    const std::string failure = reason_of([&] { show(request, loaded.scene.get()); });
+    const std::string failure = failure_of([&] { show(request, loaded.scene.get()); });
     if (failure.empty()) continue;
-    notify((request.preset ? request.preset->file + ": " : "") + failure, true);
+    scene_failure_ = (request.preset ? request.preset->file + ": " : "") + failure;
+    notify(scene_failure_, true);
     if (request.again) loaded_ = request.parts;  // there is no more to have: not asked for again and again
   }
   load_next();
@@ -360,8 +377,12 @@ void Session::show(const Request& request, std::shared_ptr<const Scene> scene) {
   if (request.preset) take(*request.preset, 0);
   if (other) read_views();
   if (request.again) return;
-  for (const std::string& warning : scene_->warnings) notify(warning);
-  for (const std::string& warning : sides_[0].demo->not_shown(*scene_)) notify(warning);
+  std::vector<std::string> warnings = scene_->warnings;
+  for (const std::string& line : sides_[0].demo->not_shown(*scene_)) warnings.push_back(line);
+  constexpr std::size_t most = 4;  // lines that hide little of the image
+  for (std::size_t i = 0; i < std::min(most, warnings.size()); ++i) notify(warnings[i]);
+  if (warnings.size() > most)
+    notify(counted(warnings.size() - most, "more warning") + "; --headless prints all of them");
 }
 
 double Session::aspect() const {
@@ -371,7 +392,7 @@ double Session::aspect() const {
 /// Throws InputError where the scene has no such view.
 void Session::use_camera(const Options& options) {
   camera_ = camera_of(*scene_, options, aspect());
-  copy_camera(Options(options), options_);
+  copy_camera(options, options_);
 }
 
 void Session::set_camera(const Camera& camera, bool moving) {
@@ -426,34 +447,31 @@ bool Session::save_view(const std::string& name, bool overwrite) {
   options.target = camera_.target;
   options.up = camera_.up;
   options.field_of_view = camera_.field_of_view;
-  const std::string failure = reason_of([&] {
-    if (save(views_folder(), name, "view", flags_of(options, {}), overwrite)) read_views();
+  return attempt([&] {
+    save(views_folder(), name, "view", flags_of(options, {}), overwrite);
+    read_views();
   });
-  if (!failure.empty()) notify(failure, true);
-  return failure.empty();
 }
 
 void Session::remove_view(const std::string& name) {
-  const std::string failure = reason_of([&] { remove(views_folder(), name, "view"); });
-  if (!failure.empty()) return notify(failure, true);
-  read_views();
+  attempt([&] {
+    remove(views_folder(), name, "view");
+    read_views();
+  });
 }
 
 void Session::read_views() {
   saved_views_.clear();
-  const std::string failure = reason_of([&] {
-    for (const std::string& name : names_in(views_folder())) {
-      const std::string unread = reason_of([&] {
-        const Options o = read_flags(file_of(views_folder(), name)).options;
+  attempt([&] {
+    const fs::path folder = views_folder();
+    for (const std::string& name : names_in(folder))
+      attempt([&] {
+        const Options o = read_flags(file_of(folder, name)).options;
         if (!o.eye || !o.target || !o.up || !o.field_of_view)
-          throw InputError(file_of(views_folder(), name).string() +
-                           " is no view; eye, target, up and fov make one");
+          throw InputError(file_of(folder, name).string() + ": is no view; eye, target, up and fov make one");
         saved_views_.push_back({name, {*o.eye, *o.target, *o.up, *o.field_of_view}});
       });
-      if (!unread.empty()) notify(unread, true);
-    }
   });
-  if (!failure.empty()) notify(failure, true);
 }
 
 // ---- presets -----------------------------------------------------------------
@@ -469,48 +487,44 @@ std::vector<std::string> Session::presets() const {
   }
 }
 
-/// Returns whether it was written. Throws InputError.
-bool Session::save(const fs::path& folder, const std::string& name, const std::string& what,
+/// Throws InputError where it was not written.
+void Session::save(const fs::path& folder, const std::string& name, const std::string& what,
                    const std::vector<std::string>& flags, bool overwrite) {
   check_name(name, what);
   const fs::path file = file_of(folder, name);
   std::error_code error;
-  if (!overwrite && fs::exists(file, error))
-    throw InputError("there is a " + what + " called " + in_quotes(name) + " already; replace it knowingly, or choose another name");
+  if (!overwrite && fs::exists(fs::symlink_status(file, error)))
+    throw InputError("there is a " + what + " called " + in_quotes(name) +
+                     " already; remove it first, or choose another name");
   const std::string text = config_of(flags);
   make_folder(folder.string());
   write_whole_file(file.string(), text);
-  notify("Kept in " + file.string());
-  return true;
+  notify("The " + what + " is in " + file.string());
 }
 
 /// Throws InputError where there is none, or it cannot be removed.
-bool Session::remove(const fs::path& folder, const std::string& name, const std::string& what) {
+void Session::remove(const fs::path& folder, const std::string& name, const std::string& what) {
   check_name(name, what);
   const fs::path file = file_of(folder, name);
   std::error_code error;
-  if (fs::remove(file, error)) return true;
-  throw InputError(file.string() + ": cannot be removed: " + (error ? error.message() : "there is no such " + what));
+  if (fs::remove(file, error)) return;
+  throw InputError(file.string() +
+                   ": cannot be removed: " + (error ? error.message() : "there is no such " + what));
 }
 
 bool Session::save_preset(int side, const std::string& name, bool overwrite) {
-  const std::string failure =
-      reason_of([&] { save(presets_folder(), name, "preset", flags(side), overwrite); });
-  if (!failure.empty()) notify(failure, true);
-  return failure.empty();
+  return attempt([&] { save(presets_folder(), name, "preset", flags(side), overwrite); });
 }
 
 void Session::load_preset(int side, const std::string& name) {
-  const std::string failure = reason_of([&] {
+  attempt([&] {
     check_name(name, "preset");
     load_config(side, file_of(presets_folder(), name));
   });
-  if (!failure.empty()) notify(failure, true);
 }
 
 void Session::remove_preset(const std::string& name) {
-  const std::string failure = reason_of([&] { remove(presets_folder(), name, "preset"); });
-  if (!failure.empty()) notify(failure, true);
+  attempt([&] { remove(presets_folder(), name, "preset"); });
 }
 
 /// Throws InputError with file and line.
@@ -521,49 +535,61 @@ Session::Said Session::read_flags(const fs::path& file) const {
   Said said;
   said.file = file.string();
   read_config_file(said.file, *demo, settings, said.options);
+  if (const std::string flag = beyond_windows(said.options); !flag.empty())
+    throw InputError(said.file + ": " + flag +
+                     " is nothing that a window does; leave it out, or run that file with --config");
   if (said.options.backend)
     if (const std::string why = why_unavailable(*said.options.backend); !why.empty())
-      throw InputError(said.file + ": --backend " + trilha::name(*said.options.backend) + ": " + why +
-                       "; a preset without it takes what is there");
+      throw InputError(said.file + ": --backend " + name(*said.options.backend) + ": " + why +
+                       "; without that line it runs where it can");
   said.settings = settings.texts();
   said.reads = demo->reads();
   return said;
 }
 
 void Session::load_config(int side, const fs::path& file) {
-  const std::string failure = reason_of([&] {
+  attempt([&] {
     const Said said = read_flags(file);
     if (side == 1)
       take(said, 1);
     else
       take_with_scene(said);
   });
-  if (!failure.empty()) notify(failure, true);
 }
 
 /// Settings and backend, and of A what belongs to no side.
 void Session::take(const Said& said, int side) {
   this->side(side).settings.set_texts(said.settings);
   if (said.options.backend) this->side(side).backend = *said.options.backend;
+  if (side == 1) was_split_ = true;  // it is no copy of A any more
   if (side != 0) return;
   if (said.options.samples) samples_ = *said.options.samples;
   options_.jitter = said.options.jitter;
   options_.seed = said.options.seed;
 }
 
-/// All at once, when the scene is there: settings that meet another scene first would be rendered for nothing.
+/// All at once, when the scene is there: settings that meet another scene first would be rendered for
+/// nothing. Throws InputError where the scene that is there has no such view; nothing has changed then.
 void Session::take_with_scene(const Said& said) {
-  const std::string scene = said.options.scene.empty() ? options_.scene : lasting_name(said.options.scene);
-  if (scene_ && scene == options_.scene) {
-    Options options = options_;
-    if (names_camera(said.options)) copy_camera(said.options, options);
-    use_camera(options);  // throws before anything has changed
+  const bool names_scene = !said.options.scene.empty();
+  const std::string scene = names_scene ? lasting_name(said.options.scene) : options_.scene;
+  const bool may_read = options_.allow_paths || !said.options.allow_paths;
+  if (scene_ && scene == options_.scene && may_read) {
+    try {
+      use_camera(names_scene || names_camera(said.options) ? said.options : options_);
+    } catch (const InputError& error) {
+      throw InputError(said.file + ": " + error.what());
+    }
+    if (names_scene) {  // and not the one that is being loaded
+      asked_.reset();
+      opening_.clear();
+    }
     return take(said, 0);
   }
   Options options = options_;
   options.scene = scene;
-  options.allow_paths = said.options.allow_paths || options.allow_paths;
-  copy_camera(said.options, options);
+  if (names_scene) options.allow_paths = said.options.allow_paths;
+  if (names_scene || names_camera(said.options)) copy_camera(said.options, options);
   ask({options, both(needed(), said.reads), false, said, 0});
 }
 
@@ -580,13 +606,13 @@ std::string Session::command(int side) const { return command_of(chapter_, flags
 
 void Session::save_image(int side) {
   renderer_->image(side, [this](const Image& image, int samples, const std::string& error) {
-    const std::string failure = !error.empty() ? error : reason_of([&] {
+    attempt([&] {
+      if (!error.empty()) throw InputError(error);
       const std::string file = free_name(chapter_);
       write_image(file, image);
-      notify("The image, " + counted(static_cast<std::uint64_t>(samples), "sample") + " a pixel, is in " + file);
+      notify("The image, " + counted(static_cast<std::uint64_t>(samples), "sample") + " a pixel, is in " +
+             file);
     });
-    if (!failure.empty()) notify(failure, true);
-    changed_();
   });
 }
 
@@ -598,23 +624,33 @@ void Session::take_file(const std::string& path) {
 }
 
 void Session::require_a_scene() const {
-  if (scene_ || asked_) return;
-  for (const Notice& notice : notices())
-    if (notice.error) throw InputError(notice.text);
+  if (!scene_ && !asked_ && !scene_failure_.empty()) throw InputError(scene_failure_);
 }
 
+// ---- notices -----------------------------------------------------------------
+
 void Session::notify(const std::string& text, bool error) {
-  const std::lock_guard lock(notices_mutex_);
-  constexpr std::size_t most = 16;
-  if (notices_.size() >= most) notices_.erase(notices_.begin());
-  notices_.push_back({text, error});
+  const Notice notice{text, error};
+  {
+    const std::lock_guard lock(notices_mutex_);
+    const auto is_over = [&](const Notice& old) { return !is_fresh(old, notice.at) || old.text == text; };
+    notices_.erase(std::remove_if(notices_.begin(), notices_.end(), is_over), notices_.end());
+    notices_.push_back(notice);
+  }
+  changed_();
+}
+
+bool Session::attempt(const std::function<void()>& work) {
+  const std::string failure = failure_of(work);
+  if (!failure.empty()) notify(failure, true);
+  return failure.empty();
 }
 
 std::vector<Notice> Session::notices(std::chrono::steady_clock::time_point now) const {
   const std::lock_guard lock(notices_mutex_);
   std::vector<Notice> fresh;
   for (const Notice& notice : notices_)
-    if (now - notice.at < (notice.error ? error_stays : notice_stays)) fresh.push_back(notice);
+    if (is_fresh(notice, now)) fresh.push_back(notice);
   return fresh;
 }
 

@@ -34,8 +34,9 @@ class Session {
   };
 
   /// Begins with what the command line says: `options`, and `settings` as texts. Starts to load the scene.
-  /// `changed` is called, from any thread, when there is something new to show. Throws DeviceError where the
-  /// backend that the options name is not there, InputError for a --split file that is refused.
+  /// `changed` is called, from any thread, when there is something new to show; it may not call back. Throws
+  /// DeviceError where the backend that the options name is not there, InputError for a --split file that is
+  /// refused.
   Session(std::function<std::unique_ptr<Demo>()> make_demo, const Options& options,
           const std::vector<std::string>& settings, std::function<void()> changed);
   /// Waits for scenes that are being loaded.
@@ -50,7 +51,7 @@ class Session {
   /// To be called once a frame: takes a scene that has been loaded, and tells the renderer what is wanted if
   /// that has changed.
   void update();
-  /// Throws InputError, as the program ends with, where the first scene could not be loaded.
+  /// Throws InputError, for the program to end with, where the first scene could not be loaded.
   void require_a_scene() const;
   /// The wish that the renderer was told last.
   const Wanted& wanted() const { return wanted_; }
@@ -121,8 +122,11 @@ class Session {
   /// at once, when a scene that it names has been loaded.
   void load_preset(int side, const std::string& name);
   void remove_preset(const std::string& name);
-  /// Takes what a file of flags says, as --config would, but for the size of the image, which is the window's.
-  /// What the file does not name of scene, camera, backend and samples stays as it is.
+  /// Takes what a file of flags says, as --config would, but for the size of the image, which is the
+  /// window's. A file that names no scene and no camera leaves both as they are, and so with backend and
+  /// samples; all else that it does not name becomes as it is by default. One that asks for what no window
+  /// does, such as
+  /// --output, is refused.
   void load_config(int side, const std::filesystem::path& file);
 
   /// The command that renders what is on the screen on that side: "./trilha run 01 --scene …".
@@ -180,10 +184,12 @@ class Session {
 
   std::filesystem::path presets_folder() const;
   std::filesystem::path views_folder() const;
-  bool save(const std::filesystem::path& folder, const std::string& name, const std::string& what,
+  void save(const std::filesystem::path& folder, const std::string& name, const std::string& what,
             const std::vector<std::string>& flags, bool overwrite);
-  bool remove(const std::filesystem::path& folder, const std::string& name, const std::string& what);
+  void remove(const std::filesystem::path& folder, const std::string& name, const std::string& what);
   void read_views();
+  /// Does it; returns false, with a notice, where it throws.
+  bool attempt(const std::function<void()>& work);
 
   std::function<std::unique_ptr<Demo>()> make_demo_;
   std::function<void()> changed_;
@@ -201,7 +207,7 @@ class Session {
   std::vector<View> saved_views_;  ///< of that scene
 
   std::optional<Request> asked_;  ///< the newest request, until it is fulfilled
-  std::string opening_;
+  std::string opening_, scene_failure_;
   std::vector<Loading> loading_;  ///< the newest last; what nobody waits for any more as well
   std::uint64_t requests_ = 0;
 
