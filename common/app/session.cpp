@@ -205,7 +205,7 @@ Session::Session(std::function<std::unique_ptr<Demo>()> make_demo, const Options
   width_ = options.width, height_ = options.height;
   if (!options.split.empty()) {
     take(read_flags(options.split), 1);
-    split(true);
+    split_ = was_split_ = true;
   }
   renderer_ = std::make_unique<RenderThread>(make_demo_, changed_);
   if (!options.scene.empty()) options_.scene = lasting_name(options.scene);
