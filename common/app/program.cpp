@@ -307,8 +307,6 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   for (const std::string& warning : scene.warnings) warn(warning);
   for (const std::string& warning : demo.not_shown(scene)) warn(warning);
   for (const std::string& warning : idle_settings(settings)) warn(warning);
-  if (!no_window.empty() && !options.quiet)
-    std::cerr << "no window: " << no_window << "; rendering to " << options.output << " (--headless)\n";
 
   Outcome outcome;
   outcome.load_ms = load_ms;
@@ -320,6 +318,8 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
     render(demo, scene, stream, options, film, outcome);
     write_image(options.output, developed(film, demo.display(), stream));
   }
+  if (!no_window.empty() && !options.quiet)
+    std::cerr << "no window: " << no_window << "; rendered to " << options.output << " (--headless)\n";
   if (options.explain) {
     if (scene.images_not_read > 0)
       measure_loading([&](bool all) { return load(options, all ? LoadOptions{} : demo.reads()); },
