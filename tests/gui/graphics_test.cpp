@@ -311,6 +311,27 @@ TEST_CASE("errors of OpenGL are reported once") {
   }
 }
 
+// Catches: advice on performance that ends the program; undefined behaviour that does not; text of several
+// lines.
+TEST_CASE("of a driver's messages those of errors count") {
+  Offscreen offscreen(8, 8);
+  const auto say = [](GLenum type) {
+    glDebugMessageInsert(GL_DEBUG_SOURCE_APPLICATION, type, 1, GL_DEBUG_SEVERITY_HIGH, -1, "two\nlines\n");
+  };
+  for (const GLenum type :
+       {GL_DEBUG_TYPE_PERFORMANCE, GL_DEBUG_TYPE_OTHER, GL_DEBUG_TYPE_DEPRECATED_BEHAVIOR}) {
+    say(type);
+    check_graphics();
+  }
+  for (const GLenum type : {GL_DEBUG_TYPE_ERROR, GL_DEBUG_TYPE_UNDEFINED_BEHAVIOR}) {
+    say(type);
+    CHECK_THROWS_WITH(check_graphics(), "OpenGL: two lines");
+    say(type);
+    say(type);
+    CHECK_THROWS_WITH(check_graphics(), "OpenGL: two lines (and 1 more)");
+  }
+}
+
 // Catches: a context that keeps the next from being made, stays current, or leaves its objects behind.
 TEST_CASE("contexts come and go") {
   for (int i = 0; i < 4; ++i) {
