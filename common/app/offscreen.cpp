@@ -96,7 +96,8 @@ struct Context {
     if (display == EGL_NO_DISPLAY) return;
     eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     if (context != EGL_NO_CONTEXT) eglDestroyContext(display, context);
-    eglTerminate(display);
+    // The display stays as it is, for the next context and for others that may use it: Mesa would unload its
+    // driver, which loses some memory each time that it is loaded anew.
     eglReleaseThread();
   }
 

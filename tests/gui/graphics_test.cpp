@@ -147,7 +147,7 @@ ImVec4 colour(ImU32 packed_colour) { return ImGui::ColorConvertU32ToFloat4(packe
 
 }  // namespace
 
-// Catches: filtering, a half pixel's shift, rows upside down, red and blue exchanged, a conversion of
+// Catches: a half pixel's shift, rows upside down, red and blue exchanged, a conversion of
 // colours, rows of odd length that are padded, a picture larger than some buffer.
 TEST_CASE("a frame is drawn byte for byte") {
   Offscreen offscreen(8, 8);
@@ -168,6 +168,47 @@ TEST_CASE("a frame is drawn byte for byte") {
       check_graphics();
     }
   }
+  check_graphics();
+}
+
+// Catches: filtering, which at the size of the pixels is not seen.
+TEST_CASE("a frame that is drawn larger has sharp pixels") {
+  Offscreen offscreen(18, 12);
+  Gui gui;
+  FrameTexture texture;
+  const std::vector<PackedPixel> pixels = random_pixels(6, 4, 1);
+  texture.show(frame_of(pixels, 6, 4));
+  gui.frame(offscreen, [&] {
+    ImGui::GetBackgroundDrawList()->AddImage(
+        reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(texture.texture())), ImVec2(0, 0),
+        ImVec2(18, 12));
+  });
+  const Image image = offscreen.image();
+  std::size_t wrong = 0;
+  for (std::size_t y = 0; y < 12; ++y)
+    for (std::size_t x = 0; x < 18; ++x)
+      wrong += packed(image.pixels[y * 18 + x]) != pixels[y / 3 * 6 + x / 3];
+  CHECK(wrong == 0);
+  check_graphics();
+}
+
+// Catches: copies that depend on how others left OpenGL's settings of copying, as ImGui's renderer may.
+TEST_CASE("copies do not depend on what was copied before") {
+  Offscreen offscreen(9, 7);
+  GLuint buffer = 0;
+  glCreateBuffers(1, &buffer);
+  glNamedBufferStorage(buffer, 4096, nullptr, 0);
+  for (const GLenum target : {GL_PIXEL_UNPACK_BUFFER, GL_PIXEL_PACK_BUFFER}) glBindBuffer(target, buffer);
+  for (const GLenum length : {GL_UNPACK_ROW_LENGTH, GL_PACK_ROW_LENGTH}) glPixelStorei(length, 13);
+  for (const GLenum alignment : {GL_UNPACK_ALIGNMENT, GL_PACK_ALIGNMENT}) glPixelStorei(alignment, 8);
+  const std::vector<PackedPixel> pixels = random_pixels(9, 7, 1);
+  FrameTexture texture;
+  texture.show(frame_of(pixels, 9, 7));
+  glClearColor(1, 0, 1, 1);
+  glClear(GL_COLOR_BUFFER_BIT);
+  for (const vec3& pixel : offscreen.image().pixels) CHECK(pixel == vec3(1, 0, 1));
+  CHECK(texels(texture) == pixels);
+  glDeleteBuffers(1, &buffer);
   check_graphics();
 }
 
@@ -267,6 +308,27 @@ TEST_CASE("errors of OpenGL are reported once") {
     glEnable(0xbeef);
     CHECK_THROWS_AS(check_graphics(), GraphicsError);
     check_graphics();
+  }
+}
+
+// Catches: advice on performance that ends the program; undefined behaviour that does not; text of several
+// lines.
+TEST_CASE("of a driver's messages those of errors count") {
+  Offscreen offscreen(8, 8);
+  const auto say = [](GLenum type) {
+    glDebugMessageInsert(GL_DEBUG_SOURCE_APPLICATION, type, 1, GL_DEBUG_SEVERITY_HIGH, -1, "two\nlines\n");
+  };
+  for (const GLenum type :
+       {GL_DEBUG_TYPE_PERFORMANCE, GL_DEBUG_TYPE_OTHER, GL_DEBUG_TYPE_DEPRECATED_BEHAVIOR}) {
+    say(type);
+    check_graphics();
+  }
+  for (const GLenum type : {GL_DEBUG_TYPE_ERROR, GL_DEBUG_TYPE_UNDEFINED_BEHAVIOR}) {
+    say(type);
+    CHECK_THROWS_WITH(check_graphics(), "OpenGL: two lines");
+    say(type);
+    say(type);
+    CHECK_THROWS_WITH(check_graphics(), "OpenGL: two lines (and 1 more)");
   }
 }
 
