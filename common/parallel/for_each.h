@@ -18,6 +18,16 @@
 
 namespace trilha {
 
+#if defined(__cpp_lib_source_location)
+using SourceLocation = std::source_location;
+#else  // clang 14, which builds the fuzz targets, with GCC's library
+struct SourceLocation {
+  const char* file;
+  static constexpr SourceLocation current(const char* file = __builtin_FILE()) { return {file}; }
+  const char* file_name() const { return file; }
+};
+#endif
+
 /// The indices begin, …, end−1.
 struct IndexRange {
   std::size_t begin = 0;
@@ -36,7 +46,7 @@ struct IndexRange {
 /// asks after each `batch` indices, so they should take a millisecond at most.
 template <class Pass>
 void for_each(const Stream& stream, IndexRange range, const Pass& pass, std::size_t batch = 1024,
-              std::source_location where = std::source_location::current()) {
+              SourceLocation where = SourceLocation::current()) {
   if (range.size() == 0) return stop_if_cancelled();
   if (stream.backend() == Backend::cpu) {
     const std::size_t least = std::max<std::size_t>(batch, 1);

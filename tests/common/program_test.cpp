@@ -66,7 +66,7 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
       {"--scene good.obj --fov wide", 2, "--fov"},
       {"--scene good.obj --eye 1,2", 2, "--eye"},
       {"--scene good.obj --eye 1,2,inf", 1, "--eye"},
-      {"--scene good.obj --eye 0,0,0 --target 0,0,0", 1, "eye"},
+      {"--scene good.obj --headless --eye 0,0,0 --target 0,0,0", 1, "eye"},
       {"--scene good.obj --output nowhere/image.png", 1, "nowhere/image.png"},
       {"--scene good.obj --output image.bmp", 1, ".bmp"},
       {"--scene good.obj --output {}", 1, "trilha test"},

@@ -351,9 +351,13 @@ TEST_CASE("a file of flags leaves scene and camera as they are, where it names n
   session->set_camera(dollied(session->camera(), 0.5), false);
   session->set(0, "count", "11");
   const Bits near = bits(session->camera());
-  write(desk.folder / "settings.ini", "weight = 2\n");
+  write(desk.folder / "settings.ini", "weight = 2\nseed = 9\njitter\n");
   session->take_file(desk.folder / "settings.ini");
   settle(*session);
+  session->set_samples(1);
+  session->update();
+  CHECK((session->wanted().seed == 9 && session->wanted().jittered));
+  session->set_samples(window_samples);
   CHECK(session->side(0).settings.texts() == Names{"pear", "false", "true", "3", "2"});
   CHECK(bits(session->camera()) == near);
   CHECK(session->samples() == window_samples);
@@ -363,10 +367,20 @@ TEST_CASE("a file of flags leaves scene and camera as they are, where it names n
   session->take_file(desk.folder / "view.ini");
   settle(*session);
   CHECK(session->camera().eye == vec3(0, 80, 1));
+  CHECK(session->wanted().seed == 0);
   write(desk.folder / "scene.ini", "scene = a scene.json\n");
   session->take_file(desk.folder / "scene.ini");
   settle(*session);
   CHECK(session->camera().eye == vec3(0, 0, 9));
+  session->open_scene("teapot");  // and is forgotten: the file asks for the one that is there
+  session->take_file(desk.folder / "scene.ini");
+  CHECK(session->opening().empty());
+  settle(*session);
+  CHECK(session->scene()->name == "a scene");
+  write(desk.folder / "paths.ini", "scene = a scene.json\nallow-paths\n");
+  session->take_file(desk.folder / "paths.ini");
+  settle(*session);
+  CHECK(Read(session->flags(0)).options.allow_paths);
   session->take_file(desk.folder / "painted.obj");
   settle(*session);
   CHECK(session->scene()->name.find("painted") != std::string::npos);
@@ -530,8 +544,9 @@ TEST_CASE("views are kept for their scene, after those that it brings") {
   CHECK(session->camera().field_of_view == 33.3f);  // it was said so
   session->go_to(session->views()[1]);
   CHECK(session->camera().field_of_view > 3.5f);  // the scene's own suits the image
+  session->set_camera(orbited(session->camera(), 0.1, 0), false);
   session->set_size(64, 48);
-  CHECK(session->camera().field_of_view == 3.3f);
+  CHECK(session->camera().field_of_view == 3.3f);  // nobody changed it by moving
 
   std::string file;
   for (const auto& entry : fs::recursive_directory_iterator(desk.config))
@@ -735,12 +750,13 @@ TEST_CASE("a setting that wants more of the scene gets it, and the camera stays"
   session->set_camera(orbited(session->camera(), 0.3, 0.1), false);
   session->update();
   const std::shared_ptr<const Scene> plain = session->scene();
-  const Bits camera = bits(session->camera());
-  const std::vector<std::string> flags = session->flags(0);
   session->set(0, "ripe", "true");
   session->update();
   CHECK_FALSE(session->opening().empty());
   CHECK(session->wanted().scene == plain);
+  session->set_camera(orbited(session->camera(), -0.5, 0.1), false);  // which may move meanwhile
+  const Bits camera = bits(session->camera());
+  const std::vector<std::string> flags = session->flags(0);
   settle(*session);
   CHECK(session->scene() != plain);
   CHECK(session->scene()->images_not_read == 0);
@@ -749,7 +765,9 @@ TEST_CASE("a setting that wants more of the scene gets it, and the camera stays"
   session->set(0, "ripe", "false");
   settle(*session);
   CHECK(session->scene() == painted);  // what is there is enough
+  session->set(0, "ripe", "true");
   CHECK(session->flags(0) == flags);
+  session->set(0, "ripe", "false");
 
   // B's wishes count where it is seen; and what cannot be had is asked for once
   session->open_scene("painted.obj");
@@ -769,13 +787,13 @@ TEST_CASE("a setting that wants more of the scene gets it, and the camera stays"
     session->update();
     CHECK(session->opening().empty());
   }
-  // a setting that changes while a scene is being loaded
-  write_image(desk.folder / "red.png", {1, 1, Encoding::display, {vec3(1, 0, 0)}});
+  // a setting that changes while a scene is being loaded, which takes a while
   session->split(false);
-  session->open_scene("painted.obj");
+  session->open_scene("hall");
   session->set(0, "ripe", "true");
   settle(*session);
-  CHECK(session->scene()->images_not_read == 0);
+  CHECK(session->scene()->name == "hall");
+  CHECK_FALSE(session->scene()->textures.empty());
 }
 
 // Catches: notices that stay for ever, that go before they are read, that pile up, or that a thread breaks.

@@ -1,4 +1,5 @@
-// Configuration files, as --config reads them, for a chapter with a setting of each kind.
+// Configuration files, as --config reads them, for a chapter with a setting of each kind; and what was read,
+// written and read again.
 
 #include "common/app/command_line.h"
 #include "tests/fuzz/fuzz.h"
@@ -32,6 +33,26 @@ class Settled : public Demo {
   float bias_ = 0;
 };
 
+/// What is said of the picture as a file of flags, read again, says the same.
+void check_round_trip(const Options& options, const Settings& settings) {
+  const std::vector<std::string> flags = flags_of(options, settings);
+  std::string text;
+  try {
+    text = config_of(flags);
+  } catch (const InputError&) {
+    return;  // with its quotes a line may have become too long
+  }
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(text.data());
+  Settled demo;
+  Settings again;
+  demo.declare_settings(again);
+  Options read;
+  read_config_file(fuzz::file_of("preset.ini", bytes, text.size()), demo, again, read);
+  if (flags_of(read, again) == flags) return;
+  std::fprintf(stderr, "not the same when it is read again:\n%s", text.c_str());
+  std::abort();
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -43,5 +64,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::string words[] = {"fuzz_config", "--headless", "--config", path};
     char* arguments[] = {words[0].data(), words[1].data(), words[2].data(), words[3].data()};
     read_command_line(4, arguments, demo, settings, options);
+    check_round_trip(options, settings);
   });
 }
