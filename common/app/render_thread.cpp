@@ -4,10 +4,12 @@
 #include <tbb/task_scheduler_observer.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
 #include <deque>
+#include <limits>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
@@ -190,14 +192,28 @@ struct Board {
   }
 };
 
-/// oneTBB's workers of an arena, with the render thread's priority.
+/// Gives oneTBB's workers of an arena the render thread's priority, and waits at the end until they have left
+/// it, some milliseconds after their last work: a process that ended meanwhile would leave what they hold.
 class LowerPriority : public tbb::task_scheduler_observer {
  public:
   explicit LowerPriority(tbb::task_arena& arena) : task_scheduler_observer(arena) { observe(true); }
-  ~LowerPriority() override { observe(false); }
-  void on_scheduler_entry(bool is_worker) override {
-    if (is_worker) lower_priority();
+  ~LowerPriority() override {
+    for (int n = inside_; n > 0; n = inside_) inside_.wait(n);
+    observe(false);
   }
+  void on_scheduler_entry(bool is_worker) override {
+    if (!is_worker) return;
+    ++inside_;
+    lower_priority();
+  }
+  void on_scheduler_exit(bool is_worker) override {
+    if (!is_worker) return;
+    --inside_;
+    inside_.notify_all();
+  }
+
+ private:
+  std::atomic<int> inside_{0};
 };
 
 std::size_t pixel_count(int width, int height) {
@@ -446,8 +462,7 @@ struct RenderThread::State {
     tbb::task_arena own_arena(thread_count());
     const LowerPriority courtesy(own_arena);
     arena = &own_arena;
-    Worker late(Worker::End::leave),
-        soon(Worker::End::wait);  // this order: the second gives work to the first
+    Worker late, soon;  // in this order: the second gives work to the first
     measuring = &soon, measuring_slowly = &late;
     std::uint64_t requests_seen = 0;
     for (;;) {
@@ -1167,6 +1182,7 @@ struct RenderThread::State {
     const std::lock_guard lock(board->mutex);
     board->comparable = comparable;
     board->comparison.reset();
+    measuring_slowly->end_all();
   }
 
   /// Compares A with B where that says something new. Returns true if there was something to do.

@@ -1,5 +1,7 @@
 #include "common/app/worker.h"
 
+#include <tbb/task_arena.h>
+
 #if defined(__linux__)
 #include <sys/resource.h>
 #include <unistd.h>
@@ -9,6 +11,9 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <thread>
+
+#include "common/parallel/cancellation.h"
 
 namespace trilha {
 
@@ -28,42 +33,50 @@ struct Worker::State {
   std::mutex mutex;
   std::condition_variable wake;
   std::deque<Job> waiting;
+  Cancellation* current = nullptr;  ///< under way
   bool stop = false;
+  std::thread thread{[this] { run(); }};  // the last: it uses the others
 
   void run() {
     lower_priority();
+    tbb::task_arena alone(1);  // oneTBB's other threads have better things to do
     std::unique_lock lock(mutex);
     for (;;) {
       wake.wait(lock, [&] { return stop || !waiting.empty(); });
       if (stop) return;
       std::function<void()> work = std::move(waiting.front().work);
       waiting.pop_front();
+      Cancellation cancellation;
+      current = &cancellation;
       lock.unlock();
       try {
-        work();
+        alone.execute([&] { cancellation.run(work); });
       } catch (...) {  // memory was short: what was to be measured stays unmeasured
       }
       work = nullptr;  // what it holds is let go of here, not when the next job comes
       lock.lock();
+      current = nullptr;
     }
   }
 };
 
-Worker::Worker(End end)
-    : state_(std::make_shared<State>()), end_(end), thread_([state = state_] { state->run(); }) {}
+Worker::Worker() : state_(std::make_unique<State>()) {}
 
 Worker::~Worker() {
-  std::deque<State::Job> dropped;
   {
     const std::lock_guard lock(state_->mutex);
     state_->stop = true;
-    dropped.swap(state_->waiting);
   }
+  end_all();
   state_->wake.notify_all();
-  if (end_ == End::wait)
-    thread_.join();
-  else
-    thread_.detach();
+  state_->thread.join();
+}
+
+void Worker::end_all() {
+  std::deque<State::Job> dropped;  // after the lock is open again
+  const std::lock_guard lock(state_->mutex);
+  dropped.swap(state_->waiting);
+  if (state_->current) state_->current->cancel();
 }
 
 void Worker::post(int key, std::size_t most, std::function<void()> job) {

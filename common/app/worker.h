@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <thread>
 
 namespace trilha {
 
@@ -11,27 +10,25 @@ namespace trilha {
 /// a window draws is never to wait for what it shows.
 void lower_priority();
 
-/// A thread that does jobs, one after the other, for a thread that may not wait for them. Its priority is
-/// lowered.
+/// A thread of lowered priority that does jobs, one after the other, for a thread that may not wait for them.
 class Worker {
  public:
-  /// What its destruction does about the job under way: waits for its end, or leaves it to end by itself,
-  /// with what it holds. Jobs that wait are dropped.
-  enum class End { wait, leave };
-  explicit Worker(End end);
+  Worker();
+  /// Ends as end_all() does, and waits for it.
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// A job that throws has no effect. At most `most` of one key wait at a time: of more, the oldest is
-  /// dropped.
+  /// Jobs run as work that can be cancelled. One that throws has no effect. At most `most` of one key wait at
+  /// a time: of more, the oldest is dropped.
   void post(int key, std::size_t most, std::function<void()> job);
+
+  /// Drops the jobs that wait and cancels the one under way.
+  void end_all();
 
  private:
   struct State;
-  std::shared_ptr<State> state_;
-  End end_;
-  std::thread thread_;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace trilha

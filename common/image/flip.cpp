@@ -7,6 +7,7 @@
 
 #include "common/image/measures.h"
 #include "common/image/plane.h"
+#include "common/parallel/cancellation.h"
 
 namespace trilha {
 namespace {
@@ -126,6 +127,7 @@ Appearance appearance(const Image& display, double pixels_per_degree) {
   std::vector<Plane> channels(3, Plane(display.width, display.height));
   Plane luminance(display.width, display.height);
   for (std::size_t i = 0; i < display.pixels.size(); ++i) {
+    if (i % 4096 == 0) stop_if_cancelled();
     const vec3& p = display.pixels[i];
     const dvec3 relative = relative_xyz({srgb_decoded(p.x), srgb_decoded(p.y), srgb_decoded(p.z)});
     luminance.values[i] = relative.y;
@@ -136,6 +138,7 @@ Appearance appearance(const Image& display, double pixels_per_degree) {
   Appearance result{std::vector<dvec3>(display.pixels.size()), feature(luminance, pixels_per_degree, false),
                     feature(luminance, pixels_per_degree, true)};
   for (std::size_t i = 0; i < result.lab.size(); ++i) {
+    if (i % 4096 == 0) stop_if_cancelled();
     const dvec3 o{channels[0].values[i], channels[1].values[i], channels[2].values[i]};
     result.lab[i] = hunt_lab(glm::clamp(rgb_of_relative_xyz(relative_of_opponent(o)), 0.0, 1.0));
   }
@@ -154,6 +157,7 @@ double flip(const Image& test, const Image& reference, double pixels_per_degree,
   const double knee = p_c * largest;
   std::vector<double> result(test.pixels.size());
   for (std::size_t i = 0; i < result.size(); ++i) {
+    if (i % 4096 == 0) stop_if_cancelled();
     const double distance = colour_distance(t.lab[i], r.lab[i]);
     const double colour =
         distance < knee ? p_t / knee * distance : p_t + (distance - knee) / (largest - knee) * (1 - p_t);

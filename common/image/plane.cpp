@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/error.h"
+#include "common/parallel/cancellation.h"
 
 namespace trilha {
 
@@ -59,6 +60,7 @@ Plane filtered(const Plane& plane, const std::vector<double>& horizontal,
   Plane across(plane.width, plane.height), result(plane.width, plane.height);
   std::vector<double> padded(width + 2 * h);
   for (int y = 0; y < plane.height; ++y) {
+    stop_if_cancelled();
     const double* in = plane.row(y);
     double* out = across.row(y);
     std::fill_n(padded.begin(), h, in[0]);
@@ -68,6 +70,7 @@ Plane filtered(const Plane& plane, const std::vector<double>& horizontal,
       for (std::size_t x = 0; x < width; ++x) out[x] += horizontal[i] * padded[x + i];
   }
   for (int y = 0; y < plane.height; ++y) {
+    stop_if_cancelled();
     double* out = result.row(y);
     for (int j = -v; j <= v; ++j) {
       const double* in = across.row(std::clamp(y + j, 0, plane.height - 1));
