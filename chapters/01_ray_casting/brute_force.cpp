@@ -9,6 +9,48 @@
 #endif
 
 namespace trilha {
+namespace {
+
+/// Ray → its hit among the triangles so far, of which these are a part: number `first` and those after it.
+template <class Primitives>
+struct TracePart {
+  using T = typename Primitives::Scalar;
+  Primitives part;
+  std::uint32_t first;
+  const RayOf<T>* rays;
+  HitOf<T>* hits;
+
+  TRILHA_HD void operator()(std::size_t i) const {
+    RayOf<T> ray = rays[i];
+    if (first > 0) ray.t_max = hits[i].t;  // only what is nearer counts; of equals the first stays
+    NoProbe probe;
+    HitOf<T> hit = BruteForce<Primitives>{part}.closest(ray, probe);
+    if (hit.found()) hit.primitive += first;
+    if (first == 0 || hit.found()) hits[i] = hit;
+  }
+};
+
+/// The plain loop. On the CPU a pass can be cancelled between batches, which should take a few milliseconds:
+/// of very many triangles a ray meets one part after the other. Smaller parts would stay in a cache, which is
+/// what the blocks are for.
+template <class Test, class T>
+void trace_plain(const Stream& stream, const Triangles<Test, T>& triangles, const RayOf<T>* rays,
+                 HitOf<T>* hits, std::size_t n) {
+  constexpr std::uint32_t most_triangles_a_part = 1 << 19, most_tests_a_batch = 1 << 17;
+  const std::uint32_t count = triangles.count;
+  const std::size_t batch = std::clamp<std::size_t>(most_tests_a_batch / std::max(count, 1u), 1, 64);
+  if (stream.backend() == Backend::cuda || count <= most_triangles_a_part)
+    return for_each(stream, n, Trace<BruteForce<Triangles<Test, T>>>{{triangles}, 0, rays, hits}, batch);
+  for (std::size_t first = 0; first < count; first += most_triangles_a_part) {
+    Triangles<Test, T> part = triangles;
+    part.numbers += first * Test::numbers;
+    part.count = static_cast<std::uint32_t>(std::min<std::size_t>(most_triangles_a_part, count - first));
+    for_each(stream, n, TracePart<Triangles<Test, T>>{part, static_cast<std::uint32_t>(first), rays, hits},
+             batch);
+  }
+}
+
+}  // namespace
 
 template <class Test, class T>
 Buffer<T> prepare_triangles(const Stream& stream, Loop loop, const vec3* positions, const uvec3* triangles,
@@ -25,10 +67,7 @@ template <class Test, class T>
 void trace_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles,
                      const RayOf<T>* rays, HitOf<T>* hits, std::size_t n) {
   if (loop == Loop::plain) {
-    // On the CPU it is between batches that a pass can be cancelled: of many triangles, a batch is one ray.
-    constexpr std::size_t most_tests = 1 << 17;  // in a batch: a millisecond or two
-    const std::size_t batch = std::clamp<std::size_t>(most_tests / std::max(triangles.count, 1u), 1, 64);
-    for_each(stream, n, Trace<BruteForce<Triangles<Test, T>>>{{triangles}, 0, rays, hits}, batch);
+    trace_plain(stream, triangles, rays, hits, n);
   } else if (stream.backend() == Backend::cpu) {
     trace_blocks(triangles, rays, hits, n);
   } else {
