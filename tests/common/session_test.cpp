@@ -344,6 +344,27 @@ TEST_CASE("B takes the settings of a preset alone") {
   CHECK(session->side(0).settings["count"].text() == "3");
 }
 
+// Catches: a command or a preset that names the other side's backend, or the one that the session began with;
+// a preset whose backend is not taken. It needs no GPU: nothing is told to the renderer.
+TEST_CASE("commands and presets name the backend of their side, and it is taken from them") {
+  Desk desk;
+  const auto session = open("a scene.json");
+  session->split(true);
+  session->side(1).backend = Backend::cuda;
+  CHECK(Read(session->flags(0)).options.backend == Backend::cpu);
+  CHECK(Read(session->flags(1)).options.backend == Backend::cuda);
+  CHECK(session->command(1).find("--backend cuda") != std::string::npos);
+  REQUIRE(session->save_preset(0, "of A"));
+  REQUIRE(session->save_preset(1, "of B"));
+  CHECK(Read({"--config", (desk.presets() / "of A.ini").string()}).options.backend == Backend::cpu);
+  CHECK(Read({"--config", (desk.presets() / "of B.ini").string()}).options.backend == Backend::cuda);
+  for (int side = 0; side < 2; ++side) {
+    session->side(side).backend = Backend::cuda;
+    session->load_preset(side, "of A");
+    CHECK(session->side(side).backend == Backend::cpu);
+  }
+}
+
 // Catches: what a file does not name being reset with the rest, or kept where it is to be as by default.
 TEST_CASE("a file of flags leaves scene and camera as they are, where it names none") {
   Desk desk;
@@ -438,6 +459,8 @@ TEST_CASE("a preset that is refused changes nothing, and is named") {
     write(desk.presets() / "cuda.ini", "count = 4\nbackend = cuda\n");
     check("cuda", "--backend cuda");
   }
+  fs::create_directory(desk.presets() / "folder.ini");
+  check("folder", "folder.ini");
   session->load_preset(0, "missing");
   CHECK(error_of(*session).find("missing.ini") != std::string::npos);
   CHECK(State(*session) == before);
