@@ -67,6 +67,14 @@ void write_whole_file(const std::string& path, const std::string& bytes) {
 
 void check_can_write_file(const std::string& path) { WholeFile attempt(path); }
 
+std::string free_name(const std::string& stem, const std::string& extension) {
+  std::error_code error;
+  for (int number = 1;; ++number) {
+    std::string name = stem + "_" + std::to_string(number) + extension;
+    if (!fs::exists(fs::symlink_status(name, error))) return name;
+  }
+}
+
 void make_folder(const std::string& folder) {
   std::error_code error;
   fs::create_directories(folder, error);

@@ -582,6 +582,14 @@ std::string config_of(const std::vector<std::string>& flags) {
   return text;
 }
 
+Backend backend_of(const Options& options) {
+  const Backend backend = options.backend.value_or(Backend::cuda);
+  const std::string reason = why_unavailable(backend);
+  if (reason.empty()) return backend;
+  if (options.backend) throw DeviceError("--backend cuda: " + reason + "; use --backend cpu");
+  return Backend::cpu;
+}
+
 Camera camera_of(const Scene& scene, const Options& options, double aspect) {
   Camera camera = scene.camera;
   if (!options.view.empty()) {

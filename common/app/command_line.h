@@ -69,6 +69,10 @@ void read_config_file(const std::string& path, Demo& demo, Settings& settings, O
 /// image, but for what the options say. Throws InputError where the scene has no such view.
 Camera camera_of(const Scene& scene, const Options& options, double aspect);
 
+/// Where the options let it run: CUDA if it is there, unless said. Throws DeviceError where the backend that
+/// they name is not there.
+Backend backend_of(const Options& options);
+
 /// A pixel's samples in a window, unless said, and the most anywhere.
 constexpr int window_samples = 1024, most_samples = 1 << 24;
 

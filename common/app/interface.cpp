@@ -1,7 +1,7 @@
 #include "common/app/interface.h"
 
-#include <epoxy/gl.h>
 #include <backends/imgui_impl_opengl3.h>
+#include <epoxy/gl.h>
 
 #include <algorithm>
 #include <cmath>
@@ -84,7 +84,7 @@ void Interface::set_scale(float scale) {
 void Interface::draw(int width, int height) {
   const auto begin = Clock::now();
   if (fonts_changed_) {
-    fonts_ = apply_theme(scale_);
+    apply_theme(scale_);
     ImGui_ImplOpenGL3_DestroyFontsTexture();
     ImGui_ImplOpenGL3_CreateFontsTexture();
     fonts_changed_ = false;
@@ -113,7 +113,8 @@ void Interface::draw(int width, int height) {
   const auto end = Clock::now();
   if (still_moving_ > 0) --still_moving_;
   if (ImGui::IsAnyItemActive() || ImGui::GetIO().WantTextInput) wake();
-  if (last_frame_ && ms_between(*last_frame_, begin) < 200) remember(times_.frame, ms_between(*last_frame_, begin));
+  if (last_frame_ && ms_between(*last_frame_, begin) < 200)
+    remember(times_.frame, ms_between(*last_frame_, begin));
   last_frame_ = begin;
   remember(times_.drawing, ms_between(begin, end));
   if (const auto found = asked_.upper_bound(picture_.generation); found != asked_.begin()) {
@@ -186,7 +187,8 @@ void Interface::handle_keys() {
   if (pressed('R')) session_.make_reference(session_.reference_samples() > 0 ? 0 : reference_samples_);
   if (pressed('C')) copy_command(side_);
   if (pressed(keys::tab) && session_.is_split()) side_ = 1 - side_;
-  if (pressed('F')) click(static_cast<int>(io.MousePos.x) - image_.x, static_cast<int>(io.MousePos.y) - image_.y);
+  if (pressed('F'))
+    click(static_cast<int>(io.MousePos.x) - image_.x, static_cast<int>(io.MousePos.y) - image_.y);
   if (pressed('F') && pixel_) pixel_->focus = true;
   if (session_.is_split()) {
     const float step = 8.0f / static_cast<float>(image_.width);
@@ -230,7 +232,7 @@ void Interface::top_bar() {
   ImGui::PopStyleVar(3);
   ImGui::PushAllowKeyboardFocus(false);
   ImGui::AlignTextToFramePadding();
-  ImGui::PushFont(fonts_.strong);
+  ImGui::PushFont(fonts().strong);
   ImGui::TextUnformatted(session_.title().c_str());
   ImGui::PopFont();
   ImGui::SameLine(0, units(16));
@@ -241,7 +243,8 @@ void Interface::top_bar() {
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", tip);
     const ImVec2 below{ImGui::GetItemRectMin().x, ImGui::GetItemRectMax().y + units(4)};
     ImGui::SetNextWindowPos(below);
-    ImGui::SetNextWindowSizeConstraints({units(240), 0}, {units(620), static_cast<float>(height_) - below.y - units(8)});
+    ImGui::SetNextWindowSizeConstraints({units(240), 0},
+                                        {units(620), static_cast<float>(height_) - below.y - units(8)});
     if (ImGui::BeginPopup(name)) {
       body();
       if (ImGui::IsKeyPressed(keys::escape, false)) ImGui::CloseCurrentPopup();
@@ -255,14 +258,18 @@ void Interface::top_bar() {
   ImGui::Dummy({units(4), 0});
   if (tool("Split", "A | B: two sets of settings side by side (S)", session_.is_split()))
     session_.split(!session_.is_split());
-  if (tool("Difference", session_.is_split() ? "What A and B differ in, pixel by pixel (D)" : "Split the view first (S)",
+  if (tool("Difference",
+           session_.is_split() ? "What A and B differ in, pixel by pixel (D)" : "Split the view first (S)",
            session_.difference_shown() && session_.is_split(), session_.is_split()))
     session_.show_difference(!session_.difference_shown());
-  if (tool("Reference", "Make a reference image and tell errors against it (R)", session_.reference_samples() > 0))
+  if (tool("Reference", "Make a reference image and tell errors against it (R)",
+           session_.reference_samples() > 0))
     session_.make_reference(session_.reference_samples() > 0 ? 0 : reference_samples_);
   if (tool("Pause", "Stop adding samples (Space)", session_.paused())) session_.pause(!session_.paused());
-  if (tool("Copy command", "The command line that renders what is on the screen (C)", false)) copy_command(side_);
-  if (tool("Save image", "As the renderer has it, in the working directory (F2)", false)) session_.save_image(side_);
+  if (tool("Copy command", "The command line that renders what is on the screen (C)", false))
+    copy_command(side_);
+  if (tool("Save image", "As the renderer has it, in the working directory (F2)", false))
+    session_.save_image(side_);
   if (tool("Help", "Mouse, keys, and what this is (F1)", help_shown_)) help_shown_ = !help_shown_;
 
   // what goes on, at the right
@@ -293,8 +300,9 @@ void Interface::scene_menu() {
   if (scenes_.empty()) scenes_ = scene_table();
   ImGui::TextUnformatted("A name with parameters (hall:detail=4), or a file");
   ImGui::SetNextItemWidth(units(380));
-  const bool entered = ImGui::InputTextWithHint("##scene", session_.scene() ? session_.scene()->name.c_str() : "",
-                                                scene_text_, sizeof scene_text_, ImGuiInputTextFlags_EnterReturnsTrue);
+  const bool entered =
+      ImGui::InputTextWithHint("##scene", session_.scene() ? session_.scene()->name.c_str() : "", scene_text_,
+                               sizeof scene_text_, ImGuiInputTextFlags_EnterReturnsTrue);
   mark("text scene");
   ImGui::SameLine();
   if ((ImGui::Button("Open") || entered) && scene_text_[0] != 0) {
@@ -305,8 +313,8 @@ void Interface::scene_menu() {
   ImGui::Separator();
   const auto item = [&](const SceneEntry& scene, const std::string& shown) {
     const std::string detail = scene.triangles ? counted(*scene.triangles, "triangle") : "";
-    if (ImGui::MenuItem(shown.c_str(), detail.c_str(), session_.scene() && session_.scene()->name == scene.name,
-                        scene.available)) {
+    if (ImGui::MenuItem(shown.c_str(), detail.c_str(),
+                        session_.scene() && session_.scene()->name == scene.name, scene.available)) {
       session_.open_scene(scene.name);
       ImGui::CloseCurrentPopup();
     }
@@ -341,18 +349,27 @@ void Interface::scene_menu() {
 
 void Interface::view_menu() {
   int number = 0;
-  std::string removed;
-  for (const View& view : session_.views()) {
+  const std::vector<View> views = session_.views();
+  for (const View& view : views) {
     const std::string key = ++number <= 9 ? std::to_string(number) : "";
+    ImGui::PushID(number);
     if (ImGui::MenuItem(view.name.c_str(), key.c_str())) session_.go_to(view);
     mark("view " + view.name);
+    const bool saved = static_cast<std::size_t>(number) > session_.scene()->views.size();
+    if (saved && ImGui::BeginPopupContextItem()) {
+      if (ImGui::MenuItem("Remove")) session_.remove_view(view.name);
+      ImGui::EndPopup();
+    }
+    if (saved && ImGui::IsItemHovered()) ImGui::SetTooltip("Right click: remove");
+    ImGui::PopID();
   }
   if (ImGui::MenuItem("As the scene says", "Home")) session_.reset_camera();
   mark("view reset");
   ImGui::Separator();
   Camera camera = session_.camera();
   ImGui::SetNextItemWidth(units(200));
-  if (ImGui::SliderFloat("Field of view", &camera.field_of_view, 1, 150, "%.1f°", ImGuiSliderFlags_AlwaysClamp))
+  if (ImGui::SliderFloat("Field of view", &camera.field_of_view, 1, 150, "%.1f°",
+                         ImGuiSliderFlags_AlwaysClamp))
     session_.set_camera(camera, true);
   mark("slider Field of view");
   if (ImGui::IsItemDeactivatedAfterEdit()) session_.set_camera(session_.camera(), false);
@@ -363,14 +380,15 @@ void Interface::view_menu() {
   mark("slider Speed");
   ImGui::Separator();
   ImGui::SetNextItemWidth(units(200));
-  const bool entered =
-      ImGui::InputTextWithHint("##view", "name", name_text_, sizeof name_text_, ImGuiInputTextFlags_EnterReturnsTrue);
+  const bool entered = ImGui::InputTextWithHint("##view", "name", name_text_, sizeof name_text_,
+                                                ImGuiInputTextFlags_EnterReturnsTrue);
   mark("text view");
   ImGui::SameLine();
-  if ((ImGui::Button("Save this view") || entered) && name_text_[0] != 0) {
-    session_.save_view(name_text_);
-    name_text_[0] = 0;
-  }
+  const std::size_t own = session_.scene() ? session_.scene()->views.size() : 0;
+  const bool exists = std::any_of(views.begin() + static_cast<std::ptrdiff_t>(own), views.end(),
+                                  [&](const View& view) { return view.name == name_text_; });
+  const bool clicked = ImGui::Button(exists ? "Replace it" : "Save this view");
+  if ((clicked || entered) && session_.save_view(name_text_, clicked && exists)) name_text_[0] = 0;
   mark("button Save this view");
 }
 
@@ -394,14 +412,13 @@ void Interface::preset_menu() {
   mark("text preset");
   ImGui::SameLine();
   const bool exists = std::find(presets.begin(), presets.end(), name_text_) != presets.end();
-  if ((ImGui::Button(exists ? "Replace" : "Keep these settings") || entered) && name_text_[0] != 0) {
-    session_.save_preset(side_, name_text_);
-    name_text_[0] = 0;
-  }
+  const bool clicked = ImGui::Button(exists ? "Replace it" : "Keep these settings");
+  if ((clicked || entered) && session_.save_preset(side_, name_text_, clicked && exists)) name_text_[0] = 0;
   mark("button Keep these settings");
   if (ImGui::IsItemHovered())
-    ImGui::SetTooltip("Settings, scene and camera, as a file of flags: a program reads it with --config.\n"
-                      "Into B only the settings are taken: scene and camera are common to both sides.");
+    ImGui::SetTooltip(
+        "Settings, scene and camera, as a file of flags: a program reads it with --config.\n"
+        "Into B only the settings are taken: scene and camera are common to both sides.");
 }
 
 // ---- over everything ---------------------------------------------------------
@@ -415,10 +432,12 @@ void Interface::notices() {
     ImGui::SetNextWindowPos({units(12), y}, ImGuiCond_Always, {0, 1});
     ImGui::SetNextWindowSizeConstraints({0, 0}, {wide, units(200)});
     ImGui::SetNextWindowBgAlpha(0.92f);
-    ImGui::PushStyleColor(ImGuiCol_Border, notice->error ? colours::bad : ImGui::GetColorU32(ImGuiCol_Border));
+    ImGui::PushStyleColor(ImGuiCol_Border,
+                          notice->error ? colours::bad : ImGui::GetColorU32(ImGuiCol_Border));
     ImGui::Begin(("notice" + std::to_string(number)).c_str(), nullptr,
-                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoInputs |
-                     ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoSavedSettings);
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                     ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoFocusOnAppearing |
+                     ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoSavedSettings);
     ImGui::PushTextWrapPos(wide - units(24));
     ImGui::TextUnformatted(notice->text.c_str());
     ImGui::PopTextWrapPos();
@@ -431,19 +450,20 @@ void Interface::notices() {
 void Interface::help() {
   const ImVec2 middle{static_cast<float>(width_) / 2, static_cast<float>(height_) / 2};
   ImGui::SetNextWindowPos(middle, ImGuiCond_Always, {0.5f, 0.5f});
-  ImGui::SetNextWindowSizeConstraints({units(560), 0},
-                                      {units(700), static_cast<float>(height_) - units(24)});
-  ImGui::Begin("Help", &help_shown_,
-               ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings);
+  ImGui::SetNextWindowSizeConstraints({units(560), 0}, {units(700), static_cast<float>(height_) - units(24)});
+  ImGui::Begin(
+      "Help", &help_shown_,
+      ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings);
   ImGui::TextWrapped("The lesson: chapters/%s/README.md", session_.chapter().c_str());
-  ImGui::TextWrapped("Every setting is a flag too: what its tooltip names goes on the command line and into files that "
-                     "--config reads.");
+  ImGui::TextWrapped(
+      "Every setting is a flag too: what its tooltip names goes on the command line and into files that "
+      "--config reads.");
   ImGui::Spacing();
   if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
     for (const Shortcut& shortcut : shortcuts) {
       ImGui::TableNextRow();
       ImGui::TableNextColumn();
-      ImGui::PushFont(fonts_.strong);
+      ImGui::PushFont(fonts().strong);
       ImGui::TextUnformatted(shortcut.keys);
       ImGui::PopFont();
       ImGui::TableNextColumn();
@@ -452,18 +472,20 @@ void Interface::help() {
     ImGui::EndTable();
   }
   ImGui::Spacing();
-  ImGui::PushFont(fonts_.small);
+  ImGui::PushFont(fonts().small);
   ImGui::TextWrapped("Drawn by %s; frames are %s.", graphics_name().c_str(), textures_[0]->route().c_str());
   if (!times_.frame.empty()) {
     const auto percentile = [](std::vector<double> times, double part) {
-      const auto at = times.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(times.size() - 1));
+      const auto at =
+          times.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(times.size() - 1));
       std::nth_element(times.begin(), at, times.end());
       return *at;
     };
-    ImGui::TextWrapped("A frame of the window: median %s, 99 in 100 within %s. From a change to its first picture: median %s.",
-                       duration(percentile(times_.frame, 0.5)).c_str(),
-                       duration(percentile(times_.frame, 0.99)).c_str(),
-                       times_.latency.empty() ? "not known yet" : duration(percentile(times_.latency, 0.5)).c_str());
+    ImGui::TextWrapped(
+        "A frame of the window: median %s, 99 in 100 within %s. From a change to its first picture: median "
+        "%s.",
+        duration(percentile(times_.frame, 0.5)).c_str(), duration(percentile(times_.frame, 0.99)).c_str(),
+        times_.latency.empty() ? "not known yet" : duration(percentile(times_.latency, 0.5)).c_str());
   }
   ImGui::PopFont();
   ImGui::End();

@@ -1,6 +1,6 @@
 #pragma once
-// What is drawn in the window and what its keys and mouse do, whoever gives the window: GLFW, or a framebuffer
-// without a display. Drawn with ImGui in an OpenGL 4.5 context.
+// What is drawn in the window and what its keys and mouse do, whoever gives the window: GLFW, or a
+// framebuffer without a display. Drawn with ImGui in an OpenGL 4.5 context.
 
 #include <chrono>
 #include <map>
@@ -15,8 +15,8 @@ namespace trilha {
 
 /// Keys by GLFW's numbers, which for letters and digits are those of ASCII.
 namespace keys {
-constexpr int space = 32, comma = 44, period = 46, escape = 256, enter = 257, tab = 258, right = 262, left = 263,
-              down = 264, up = 265, home = 268, f1 = 290, f2 = 291, f5 = 294, f9 = 298, f11 = 300,
+constexpr int space = 32, comma = 44, period = 46, escape = 256, enter = 257, tab = 258, right = 262,
+              left = 263, down = 264, up = 265, home = 268, f1 = 290, f2 = 291, f5 = 294, f9 = 298, f11 = 300,
               left_shift = 340, left_control = 341;
 }
 
@@ -56,8 +56,8 @@ class Interface {
   /// Something happened: draw some frames, since hovering and opening take more than one.
   void wake() { still_moving_ = 3; }
 
-  /// Where the image is; its pixels there are those of the newest frame, one by one, but for what is drawn over
-  /// them: labels, divider, lines. `clean` leaves all that away.
+  /// Where the image is; its pixels there are those of the newest frame, one by one, but for what is drawn
+  /// over them: labels, divider, lines. `clean` leaves all that away.
   PixelRect image_area() const { return image_; }
   void set_clean(bool clean) { clean_ = clean; }
   /// Is all that is wanted on the screen, complete?
@@ -89,7 +89,6 @@ class Interface {
   bool tool(const char* name, const char* tip, bool on, bool possible = true);
   void mark(const std::string& name);
   void copy_command(int side);
-  void leave_dialogs();
 
   // panel.cpp
   void panel();
@@ -120,7 +119,6 @@ class Interface {
 
   Session& session_;
   float scale_;
-  Fonts fonts_;
   bool fonts_changed_ = true;
   int width_ = 0, height_ = 0;
   PixelRect image_;

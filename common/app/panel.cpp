@@ -29,7 +29,7 @@ const char* consequence(Effect effect) {
 }  // namespace
 
 bool Interface::heading(const char* text, bool open) {
-  ImGui::PushFont(fonts_.strong);
+  ImGui::PushFont(fonts().strong);
   const bool shown = ImGui::CollapsingHeader(text, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
   ImGui::PopFont();
   mark(std::string("heading ") + text);
@@ -68,9 +68,10 @@ void Interface::side_tabs() {
     const ImVec4 colour = ImGui::ColorConvertU32ToFloat4(side_colours[i]);
     ImGui::PushStyleColor(ImGuiCol_Button, chosen ? colour : ImGui::GetStyleColorVec4(ImGuiCol_FrameBg));
     ImGui::PushStyleColor(ImGuiCol_ButtonHovered, {colour.x, colour.y, colour.z, chosen ? 1.0f : 0.45f});
-    ImGui::PushStyleColor(ImGuiCol_ButtonActive, colour);
-    ImGui::PushStyleColor(ImGuiCol_Text, chosen ? ImVec4(0.04f, 0.05f, 0.06f, 1) : ImGui::GetStyleColorVec4(ImGuiCol_Text));
-    ImGui::PushFont(fonts_.strong);
+    ImGui::PushStyleColor(ImGuiCol_ButtonActive, {colour.x, colour.y, colour.z, chosen ? 1.0f : 0.45f});
+    ImGui::PushStyleColor(ImGuiCol_Text,
+                          chosen ? ImVec4(0.04f, 0.05f, 0.06f, 1) : ImGui::GetStyleColorVec4(ImGuiCol_Text));
+    ImGui::PushFont(fonts().strong);
     if (ImGui::Button(i == 0 ? "A, left" : "B, right", {wide, 0})) side_ = i;
     ImGui::PopFont();
     ImGui::PopStyleColor(4);
@@ -91,15 +92,17 @@ void Interface::side_tabs() {
 void Interface::tooltip(const Setting& setting) {
   ImGui::BeginTooltip();
   ImGui::PushTextWrapPos(units(420));
-  ImGui::PushFont(fonts_.strong);
+  ImGui::PushFont(fonts().strong);
   ImGui::Text("--%s", setting.name.c_str());
   ImGui::PopFont();
   ImGui::TextUnformatted(setting.help.c_str());
-  if (!setting.active()) ImGui::TextColored(ImGui::ColorConvertU32ToFloat4(colours::side_b), "Does nothing now: %s.", setting.only.c_str());
+  if (!setting.active())
+    ImGui::TextColored(ImGui::ColorConvertU32ToFloat4(colours::side_b), "Does nothing now: %s.",
+                       setting.only.c_str());
   for (const Choice& choice : setting.choices) {
     const bool chosen = choice.value == setting.get();
     ImGui::Bullet();
-    ImGui::PushFont(chosen ? fonts_.strong : fonts_.text);
+    ImGui::PushFont(chosen ? fonts().strong : fonts().text);
     ImGui::TextUnformatted(choice.name.c_str());
     ImGui::PopFont();
     ImGui::SameLine();
@@ -126,7 +129,7 @@ void Interface::setting_row(int side, const Setting& setting) {
   const bool active = setting.active();
   ImGui::PushStyleColor(ImGuiCol_Text,
                         ImGui::GetStyleColorVec4(active ? ImGuiCol_Text : ImGuiCol_TextDisabled));
-  if (setting.changed()) ImGui::PushFont(fonts_.strong);
+  if (setting.changed()) ImGui::PushFont(fonts().strong);
   ImGui::TextUnformatted(setting.name.c_str());
   if (setting.changed()) ImGui::PopFont();
   ImGui::PopStyleColor();
@@ -155,16 +158,17 @@ void Interface::setting_row(int side, const Setting& setting) {
     case Setting::Kind::integer: {
       int value = static_cast<int>(setting.get());
       const bool wide = setting.high - setting.low > 1000 && setting.low >= 0;
-      if (ImGui::SliderInt(id.c_str(), &value, static_cast<int>(setting.low), static_cast<int>(setting.high), "%d",
-                           ImGuiSliderFlags_AlwaysClamp | (wide ? ImGuiSliderFlags_Logarithmic : 0)))
+      if (ImGui::SliderInt(id.c_str(), &value, static_cast<int>(setting.low), static_cast<int>(setting.high),
+                           "%d", ImGuiSliderFlags_AlwaysClamp | (wide ? ImGuiSliderFlags_Logarithmic : 0)))
         text = std::to_string(value);
       break;
     }
     case Setting::Kind::number: {
       float value = static_cast<float>(setting.get());
       const bool wide = setting.low >= 0 && setting.high > 1000 * std::max(setting.low, 1e-3);
-      if (ImGui::SliderFloat(id.c_str(), &value, static_cast<float>(setting.low), static_cast<float>(setting.high),
-                             "%.4g", ImGuiSliderFlags_AlwaysClamp | (wide ? ImGuiSliderFlags_Logarithmic : 0)))
+      if (ImGui::SliderFloat(id.c_str(), &value, static_cast<float>(setting.low),
+                             static_cast<float>(setting.high), "%.4g",
+                             ImGuiSliderFlags_AlwaysClamp | (wide ? ImGuiSliderFlags_Logarithmic : 0)))
         text = shortest(value);
       break;
     }
@@ -197,7 +201,8 @@ void Interface::settings_of(int side) {
         const std::string why = session_.why_not(backend);
         if (backend == Backend::cuda) ImGui::SameLine();
         ImGui::BeginDisabled(!why.empty());
-        if (ImGui::RadioButton(backend == Backend::cpu ? "CPU" : "CUDA", own.backend == backend)) own.backend = backend;
+        if (ImGui::RadioButton(backend == Backend::cpu ? "CPU" : "CUDA", own.backend == backend))
+          own.backend = backend;
         mark(std::string("backend ") + side_names[side] + " " + name(backend));
         ImGui::EndDisabled();
         if (ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled))
@@ -215,8 +220,9 @@ void Interface::settings_of(int side) {
         session_.set_samples(samples);
       mark("setting samples");
       if (ImGui::IsItemHovered() && !ImGui::IsItemActive())
-        ImGui::SetTooltip("--samples: one goes through the pixel's centre, more go anywhere in it.\n"
-                          "Ctrl-click to type.");
+        ImGui::SetTooltip(
+            "--samples: one goes through the pixel's centre, more go anywhere in it.\n"
+            "Ctrl-click to type.");
       ImGui::EndTable();
     }
     std::string group;
@@ -226,7 +232,7 @@ void Interface::settings_of(int side) {
         if (open) ImGui::EndTable();
         if (setting.group != group) {
           ImGui::Spacing();
-          ImGui::PushFont(fonts_.small);
+          ImGui::PushFont(fonts().small);
           ImGui::TextDisabled("%s", setting.group.c_str());
           ImGui::PopFont();
         }
@@ -237,6 +243,14 @@ void Interface::settings_of(int side) {
       setting_row(side, setting);
     }
     if (open) ImGui::EndTable();
+    if (const int levels = session_.renderer().figures(0).overlay_levels; levels > 0) {
+      int level = std::min(session_.overlay_level(), levels - 1);
+      ImGui::SetNextItemWidth(units(150));
+      if (ImGui::SliderInt("structure drawn", &level, -1, levels - 1, level < 0 ? "none" : "level %d",
+                           ImGuiSliderFlags_AlwaysClamp))
+        session_.set_overlay_level(level);
+      mark("slider structure");
+    }
     const bool any = std::any_of(own.settings.all().begin(), own.settings.all().end(),
                                  [](const Setting& setting) { return setting.changed(); });
     ImGui::BeginDisabled(!any);
@@ -264,7 +278,8 @@ void Interface::figure_rows() {
   for (int i = 0; i < sides; ++i) of[static_cast<std::size_t>(i)] = session_.renderer().figures(i);
   if (!ImGui::BeginTable("figures", 1 + sides)) return;
   ImGui::TableSetupColumn("", ImGuiTableColumnFlags_WidthStretch, 1.2f);
-  for (int i = 0; i < sides; ++i) ImGui::TableSetupColumn(side_names[i], ImGuiTableColumnFlags_WidthStretch, 1);
+  for (int i = 0; i < sides; ++i)
+    ImGui::TableSetupColumn(side_names[i], ImGuiTableColumnFlags_WidthStretch, 1);
   const auto cell = [&](const std::string& text, ImU32 colour) {
     ImGui::TableNextColumn();
     const float room = ImGui::GetContentRegionAvail().x, wide = ImGui::CalcTextSize(text.c_str()).x;
@@ -289,13 +304,18 @@ void Interface::figure_rows() {
   row("a sample", [](const Figures& f) { return f.samples > 0 ? duration(f.sample_ms) : std::string("–"); });
   for (std::size_t k = 0; k < of[0].stage_ms.size(); ++k)
     row("   " + of[0].stage_ms[k].first, [k](const Figures& f) {
-      return k < f.stage_ms.size() && f.samples > 0 ? duration(f.stage_ms[k].second / f.samples) : std::string("–");
+      return k < f.stage_ms.size() && f.samples > 0 ? duration(f.stage_ms[k].second / f.samples)
+                                                    : std::string("–");
     });
-  row("Mrays/s", [](const Figures& f) { return f.mrays_per_s > 0 ? formatted("%.3g", f.mrays_per_s) : std::string("–"); });
+  row("Mrays/s", [](const Figures& f) {
+    return f.mrays_per_s > 0 ? formatted("%.3g", f.mrays_per_s) : std::string("–");
+  });
   row("samples", [](const Figures& f) { return std::to_string(f.samples); });
   row("all samples", [](const Figures& f) { return duration(f.render_ms); });
   if (!of[0].errors.empty() || !of[1].errors.empty())
-    row("RMSE", [](const Figures& f) { return f.errors.empty() ? std::string("–") : formatted("%.3e", f.errors.back().rmse); });
+    row("RMSE", [](const Figures& f) {
+      return f.errors.empty() ? std::string("–") : formatted("%.3e", f.errors.back().rmse);
+    });
   ImGui::EndTable();
   if (session_.scene())
     ImGui::TextDisabled("%s, %s", session_.scene()->name.c_str(),
@@ -305,13 +325,13 @@ void Interface::figure_rows() {
     ImGui::PushTextWrapPos(0);
     if (i == 0 || f.machine != of[0].machine) ImGui::TextDisabled("%s", f.machine.c_str());
     if (!f.failure.empty())
-      ImGui::TextColored(ImGui::ColorConvertU32ToFloat4(colours::bad), "%s%s", sides == 2 ? (std::string(side_names[i]) + ": ").c_str() : "",
-                         f.failure.c_str());
+      ImGui::TextColored(ImGui::ColorConvertU32ToFloat4(colours::bad), "%s%s",
+                         sides == 2 ? (std::string(side_names[i]) + ": ").c_str() : "", f.failure.c_str());
     ImGui::PopTextWrapPos();
     if (!f.histogram.empty()) {
-      const Picture& picture = picture_;
       const auto k = static_cast<std::size_t>(i);
-      const Display display = k < picture.sides.size() && picture.sides[k] ? picture.sides[k]->display : Display{};
+      const Display display =
+          k < picture_.sides.size() && picture_.sides[k] ? picture_.sides[k]->display : Display{};
       histogram(("histogram" + std::to_string(i)).c_str(), {-1, units(110)}, f.histogram, display.most,
                 (sides == 2 ? std::string(side_names[i]) + ": " : "") + display.counted + ", pixels");
     }
@@ -328,8 +348,8 @@ void Interface::memory_rows() {
     ImGui::TextDisabled("%s", what.c_str());
     ImGui::TableNextColumn();
     const std::string text = with_unit(bytes);
-    ImGui::SetCursorPosX(ImGui::GetCursorPosX() +
-                         std::max(0.0f, ImGui::GetContentRegionAvail().x - ImGui::CalcTextSize(text.c_str()).x));
+    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + std::max(0.0f, ImGui::GetContentRegionAvail().x -
+                                                                     ImGui::CalcTextSize(text.c_str()).x));
     ImGui::TextUnformatted(text.c_str());
   };
   for (const auto& [what, bytes] : f.bytes) {
@@ -347,15 +367,18 @@ void Interface::left_out() {
     ImGui::PushTextWrapPos(0);
     ImGui::Bullet();
     ImGui::TextUnformatted(saving.omission.what.c_str());
-    ImGui::PushFont(fonts_.small);
-    ImGui::TextDisabled("%s%s", saving.omission.why.c_str(),
-                        saving.ms ? ("; saves " + with_unit(*saving.bytes) + ", " + fixed(*saving.ms, 3) + " ms").c_str() : "");
+    ImGui::PushFont(fonts().small);
+    ImGui::TextDisabled(
+        "%s%s", saving.omission.why.c_str(),
+        saving.ms ? ("; saves " + with_unit(*saving.bytes) + ", " + fixed(*saving.ms, 3) + " ms").c_str()
+                  : "");
     ImGui::PopFont();
     ImGui::PopTextWrapPos();
   }
   if (ImGui::Button("Measure what that saves", {-1, 0})) session_.renderer().measure_omissions(side_);
   mark("button Measure");
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("Builds and renders with each and without, in turn, as --explain does: some seconds");
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip("Builds and renders with each and without, in turn, as --explain does: some seconds");
 }
 
 void Interface::error_section() {
@@ -367,14 +390,21 @@ void Interface::error_section() {
   mark("slider reference");
   ImGui::SameLine();
   const bool on = session_.reference_samples() > 0;
-  if (ImGui::Button(on ? "Forget it" : "Make it", {-1, 0})) session_.make_reference(on ? 0 : reference_samples_);
+  if (ImGui::Button(on ? "Forget it" : "Make it", {-1, 0}))
+    session_.make_reference(on ? 0 : reference_samples_);
   mark("button Make reference");
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("The same view by the most exact settings, with other random numbers (R)");
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip("The same view by the most exact settings, with other random numbers (R)");
   if (!on) return;
-  if (!activity.reference_failure.empty()) return ImGui::TextWrapped("%s", activity.reference_failure.c_str());
+  if (!activity.reference_failure.empty())
+    return ImGui::TextWrapped("%s", activity.reference_failure.c_str());
   if (!activity.reference_ready) {
-    ImGui::ProgressBar(static_cast<float>(activity.reference_samples) / static_cast<float>(session_.reference_samples()), {-1, 0},
-                       (std::to_string(activity.reference_samples) + " of " + counted(static_cast<std::uint64_t>(session_.reference_samples()), "sample")).c_str());
+    ImGui::ProgressBar(
+        static_cast<float>(activity.reference_samples) / static_cast<float>(session_.reference_samples()),
+        {-1, 0},
+        (std::to_string(activity.reference_samples) + " of " +
+         counted(static_cast<std::uint64_t>(session_.reference_samples()), "sample"))
+            .c_str());
     return;
   }
   std::vector<Curve> curves;
@@ -386,7 +416,8 @@ void Interface::error_section() {
     }
     curves.push_back(std::move(curve));
   }
-  log_log_plot("errors", {-1, units(200)}, "render time (ms)", "RMSE", curves, activity.reference_floor, "the reference's own");
+  log_log_plot("errors", {-1, units(200)}, "render time (ms)", "RMSE", curves, activity.reference_floor,
+               "the reference's own");
 }
 
 }  // namespace trilha

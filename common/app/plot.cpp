@@ -83,6 +83,17 @@ ImVec2 full(const ImVec2& size, float height) {
   return {size.x > 0 ? size.x : ImGui::GetContentRegionAvail().x, size.y > 0 ? size.y : height};
 }
 
+/// The place of a plot that the mouse may point at.
+struct Canvas {
+  Box box;
+  bool hovered;
+};
+Canvas canvas(const char* id, const ImVec2& size) {
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  ImGui::InvisibleButton(id, size);
+  return {{corner, corner + size}, ImGui::IsItemHovered()};
+}
+
 bool has_superscripts(const Pen& pen) { return pen.font->FindGlyphNoFallback(0x207b) != nullptr; }
 
 // ---- log axes
@@ -312,10 +323,7 @@ void log_log_plot(const char* id, const ImVec2& size, const std::string& x_label
                   const std::vector<Curve>& curves, double level, const std::string& level_name) {
   const Pen pen;
   const float u = pen.unit;
-  const ImVec2 whole = full(size, 180 * u), corner = ImGui::GetCursorScreenPos();
-  const Box all{corner, corner + whole};
-  ImGui::InvisibleButton(id, whole);
-  const bool hovered = ImGui::IsItemHovered();
+  const auto [all, hovered] = canvas(id, full(size, 180 * u));
 
   LogRange x_range, y_range;
   bool zeros = false;
@@ -448,10 +456,7 @@ void histogram(const char* id, const ImVec2& size, const std::vector<std::uint32
                const std::string& label) {
   const Pen pen;
   const float u = pen.unit;
-  const ImVec2 whole = full(size, 140 * u), corner = ImGui::GetCursorScreenPos();
-  const Box all{corner, corner + whole};
-  ImGui::InvisibleButton(id, whole);
-  const bool hovered = ImGui::IsItemHovered();
+  const auto [all, hovered] = canvas(id, full(size, 140 * u));
   if (!on_log_axis(most)) most = 1;
 
   double total = 0;

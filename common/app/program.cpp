@@ -45,14 +45,6 @@ struct Outcome {
   double mrays_per_s() const { return render_ms > 0 ? rays / render_ms / 1e3 : 0; }
 };
 
-Backend choose_backend(const Options& options) {
-  const Backend backend = options.backend.value_or(Backend::cuda);
-  const std::string reason = why_unavailable(backend);
-  if (reason.empty()) return backend;
-  if (options.backend) throw DeviceError("--backend cuda: " + reason + "; use --backend cpu");
-  return Backend::cpu;
-}
-
 Scene load(const Options& options, LoadOptions how) {
   how.allow_paths = options.allow_paths;
   Scene scene = load_scene(options.scene, how);
@@ -102,8 +94,8 @@ void print_text(const Scene& scene, const Stream& stream, const Options& options
                 << (outcome.samples == 1 ? " sample" : " samples") << " a pixel"
                 << (outcome.stopped ? " (stopped before its end)" : "") << "\n";
   line("scene") << scene.name << ", " << scene.triangle_count() << " triangles, "
-                << with_unit(static_cast<double>(bytes(scene))) << ", loaded in "
-                << fixed(outcome.load_ms, 1) << " ms\n";
+                << with_unit(static_cast<double>(bytes(scene))) << ", loaded in " << fixed(outcome.load_ms, 1)
+                << " ms\n";
   line("machine") << device_name(stream.backend()) << "\n";
   line("build") << fixed(outcome.build_ms, 2) << " ms\n";
   line("render") << fixed(outcome.render_ms, 1) << " ms";
@@ -168,7 +160,7 @@ void print_json(const Demo& demo, const Settings& settings, const Scene& scene, 
 
 /// All backends that are there, or the one that was asked for.
 std::vector<Backend> backends_of(const Options& options) {
-  if (options.backend) return {choose_backend(options)};
+  if (options.backend) return {backend_of(options)};
   std::vector<Backend> all{Backend::cpu};
   if (why_unavailable(Backend::cuda).empty()) all.push_back(Backend::cuda);
   return all;
@@ -205,8 +197,8 @@ void run_report(Demo& demo, const Settings& settings, const Options& options,
       throw UsageError("--sweep: " + sweeps[0].name + " is named twice; give its values in one list");
     const Scene scene = load(options, {});  // whatever a value of the settings may read
     for (const std::string& warning : scene.warnings) warn(warning);
-    report.run({sweep_experiment(sweeps, settings, scene, choose_backend(options), options.width,
-                                 options.height, options.samples.value_or(1), make_demo)});
+    report.run({sweep_experiment(sweeps, settings, scene, backend_of(options), options.width, options.height,
+                                 options.samples.value_or(1), make_demo)});
   }
   for (const std::string& what : report.left_out()) warn("not in the report: " + what);
   if (!options.report.empty()) report.write(options.report);
@@ -300,7 +292,7 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   }
   if (options.width == 0) options.width = 640, options.height = 480;
   check_can_write(options.output);
-  const Stream stream = choose_backend(options);
+  const Stream stream = backend_of(options);
   const auto start = Clock::now();
   const Scene scene = load(options, demo.reads());
   const double load_ms = milliseconds_since(start);
@@ -311,7 +303,8 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   Outcome outcome;
   outcome.load_ms = load_ms;
   outcome.build_ms = timed_build(demo, scene, stream);
-  catch_interrupts();  // until here there is nothing to keep, and Ctrl-C ends the program as it ends any other
+  catch_interrupts();  // until here there is nothing to keep, and Ctrl-C ends the program as it ends any
+                       // other
   std::vector<Saving> savings = left_out(demo, scene);
   {
     Film film(stream, options.width, options.height);

@@ -118,6 +118,7 @@ struct Side {
   Exposure full;
   std::uint64_t build = 0;
   double render_ms = 0, sample_ms = 0, rays = 0, build_ms = 0;
+  int overlay_levels = 0;
   std::vector<std::pair<std::string, double>> stage_ms;
 
   bool coarsely = true;  ///< this run begins with coarse films
@@ -781,6 +782,7 @@ struct RenderThread::State {
       if (!done) return;
       technique.built = true;
       side.build_ms = ms;
+      side.overlay_levels = technique.demo->overlay_levels();
       side.left_out = left_out(*technique.demo, *technique.scene);
       for (Saving& saving : side.left_out) saving.omission.keep = nullptr;
       side.stage_ms = technique.demo->stage_times();
@@ -1074,6 +1076,7 @@ struct RenderThread::State {
                        {"rays and hits", size(side.working_bytes)},
                        {"films and frames", size(side.own_bytes)}};
     figures.left_out = side.left_out;
+    figures.overlay_levels = side.overlay_levels;
     figures.failure = side.failure;
     const std::lock_guard lock(board->mutex);
     if (i >= board->sides.size()) return;

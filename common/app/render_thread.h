@@ -89,6 +89,7 @@ struct Figures {
   std::vector<std::pair<std::string, std::size_t>> bytes;
   std::vector<Saving> left_out;    ///< without the functions; measured when measure_omissions asked for it
   std::vector<ErrorPoint> errors;  ///< at 1, 2, 3, 4, 6, 8, 11, 16, … (√2 times as many) and all samples
+  int overlay_levels = 0;          ///< of the structure that was built: what Wanted::overlay_level may be
   /// Of a heat map: how many pixels lie in each of 64 equal bins from 0 to `most` (1 where that is 0).
   std::vector<std::uint32_t> histogram;
   std::string failure;  ///< why there is no picture: what was refused, in one line; any wish tries again

@@ -149,15 +149,6 @@ std::vector<std::string> names_in(const fs::path& folder) {
 
 fs::path file_of(const fs::path& folder, const std::string& name) { return folder / (name + ".ini"); }
 
-/// A name for an image that no file has yet.
-std::string free_name(const std::string& chapter) {
-  std::error_code error;
-  for (int number = 1;; ++number) {
-    std::string name = chapter + "_" + std::to_string(number) + ".png";
-    if (!fs::exists(fs::symlink_status(name, error))) return name;
-  }
-}
-
 /// Flags that a window cannot do: the first that the options have, or nothing.
 std::string beyond_windows(const Options& o) {
   if (o.stability) return "--stability";
@@ -189,11 +180,7 @@ std::string failure_of(const std::function<void()>& work) {
 Session::Session(std::function<std::unique_ptr<Demo>()> make_demo, const Options& options,
                  const std::vector<std::string>& settings, std::function<void()> changed)
     : make_demo_(std::move(make_demo)), changed_(std::move(changed)), options_(options) {
-  Backend backend = options.backend.value_or(Backend::cuda);
-  if (const std::string why = why_unavailable(backend); !why.empty()) {
-    if (options.backend) throw DeviceError("--backend cuda: " + why + "; use --backend cpu");
-    backend = Backend::cpu;
-  }
+  const Backend backend = backend_of(options);
   for (Side& side : sides_) {
     side.demo = make_demo_();
     side.demo->declare_settings(side.settings);
@@ -608,7 +595,7 @@ void Session::save_image(int side) {
   renderer_->image(side, [this](const Image& image, int samples, const std::string& error) {
     attempt([&] {
       if (!error.empty()) throw InputError(error);
-      const std::string file = free_name(chapter_);
+      const std::string file = free_name(chapter_, ".png");
       write_image(file, image);
       notify("The image, " + counted(static_cast<std::uint64_t>(samples), "sample") + " a pixel, is in " +
              file);

@@ -85,8 +85,9 @@ void set_colours(ImGuiStyle& style) {
   c[ImGuiCol_ScrollbarGrabHovered] = rgb(0x4d5768);
   c[ImGuiCol_ScrollbarGrabActive] = rgb(0x667186);
   c[ImGuiCol_CheckMark] = accent;
-  c[ImGuiCol_SliderGrab] = accent;
-  c[ImGuiCol_SliderGrabActive] = bright;
+  // as dark as can be told from the frame: the number is written over it
+  c[ImGuiCol_SliderGrab] = rgb(0x7b88da);
+  c[ImGuiCol_SliderGrabActive] = rgb(0x8a96e6);
   c[ImGuiCol_Button] = rgb(0x2f3541);
   c[ImGuiCol_ButtonHovered] = rgb(0x3a4250);
   c[ImGuiCol_ButtonActive] = chosen_active;

@@ -22,7 +22,9 @@ constexpr const char* side_names[] = {"A", "B"};
 constexpr ImU32 side_colours[] = {colours::side_a, colours::side_b};
 
 ImU32 colour_of(Line::Ink ink) {
-  return ink == Line::Ink::ray ? colours::ray : ink == Line::Ink::surface ? colours::surface : colours::structure;
+  return ink == Line::Ink::ray       ? colours::ray
+         : ink == Line::Ink::surface ? colours::surface
+                                     : colours::structure;
 }
 
 }  // namespace
@@ -36,20 +38,20 @@ void Interface::viewport() {
   ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, {1, 1});
   ImGui::Begin("image", nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                   ImGuiWindowFlags_NoBackground | ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
+                   ImGuiWindowFlags_NoBackground | ImGuiWindowFlags_NoBringToFrontOnFocus |
+                   ImGuiWindowFlags_NoNav);
   ImGui::PopStyleVar(4);
   ImGui::SetCursorPos({0, 0});
-  ImGui::InvisibleButton("pixels",
-                         {static_cast<float>(image_.width), static_cast<float>(image_.height)},
+  ImGui::InvisibleButton("pixels", {static_cast<float>(image_.width), static_cast<float>(image_.height)},
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight |
                              ImGuiButtonFlags_MouseButtonMiddle);
   mark("image");
   show_picture(picture_);
   move_camera();
   if (!clean_) {
-    ImGui::PushClipRect({static_cast<float>(image_.x), static_cast<float>(image_.y)},
-                        {static_cast<float>(image_.x + image_.width), static_cast<float>(image_.y + image_.height)},
-                        true);
+    ImGui::PushClipRect(
+        {static_cast<float>(image_.x), static_cast<float>(image_.y)},
+        {static_cast<float>(image_.x + image_.width), static_cast<float>(image_.y + image_.height)}, true);
     const bool split = picture_.sides.size() == 2 && session_.is_split();
     if (split && session_.difference_shown()) {
       difference();
@@ -70,11 +72,12 @@ void Interface::show_picture(const Picture& picture) {
   const ImVec2 high{low.x + static_cast<float>(image_.width), low.y + static_cast<float>(image_.height)};
   if (picture.sides.empty()) {
     const std::string text = !session_.opening().empty() ? "Opening " + session_.opening() + " …"
-                                                           : "Preparing the first picture …";
+                                                         : "Preparing the first picture …";
     const float wrap = static_cast<float>(image_.width) * 0.8f;
     const ImVec2 size = ImGui::CalcTextSize(text.c_str(), nullptr, false, wrap);
-    draw->AddText(fonts_.text, ImGui::GetFontSize(), {(low.x + high.x - size.x) / 2, (low.y + high.y - size.y) / 2},
-                  grey, text.c_str(), nullptr, wrap);
+    draw->AddText(fonts().text, ImGui::GetFontSize(),
+                  {(low.x + high.x - size.x) / 2, (low.y + high.y - size.y) / 2}, grey, text.c_str(), nullptr,
+                  wrap);
     return;
   }
   // B lies over A, right of the divider
@@ -103,15 +106,17 @@ void Interface::divider() {
   ImDrawList* draw = ImGui::GetWindowDrawList();
   const ImU32 colour = near || dragging_divider_ ? white : IM_COL32(235, 238, 242, 200);
   draw->AddRectFilled({x - units(2), top}, {x + units(2), bottom}, IM_COL32(12, 14, 18, 140));
-  draw->AddRectFilled({x - std::max(1.0f, units(0.75f)), top}, {x + std::max(1.0f, units(0.75f)), bottom}, colour);
+  draw->AddRectFilled({x - std::max(1.0f, units(0.75f)), top}, {x + std::max(1.0f, units(0.75f)), bottom},
+                      colour);
   draw->AddCircleFilled({x, middle}, radius, shade);
   draw->AddCircle({x, middle}, radius, colour, 0, units(1.5f));
   for (const float way : {-1.0f, 1.0f})
     draw->AddTriangleFilled({x + way * units(5.5f), middle}, {x + way * units(2), middle - units(3.5f)},
-                            {x + way * units(2), middle + units(3.5f)}, way < 0 ? colours::side_a : colours::side_b);
+                            {x + way * units(2), middle + units(3.5f)},
+                            way < 0 ? colours::side_a : colours::side_b);
   if (near || dragging_divider_) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
-  widgets_["divider"] = {static_cast<int>(x - radius), static_cast<int>(middle - radius), static_cast<int>(2 * radius),
-                         static_cast<int>(2 * radius)};
+  widgets_["divider"] = {static_cast<int>(x - radius), static_cast<int>(middle - radius),
+                         static_cast<int>(2 * radius), static_cast<int>(2 * radius)};
 }
 
 std::string Interface::what_differs(int side, const Frame& frame, const Frame* other) const {
@@ -154,38 +159,44 @@ void Interface::side_label(int side) {
   else if (frame->shrink > 1)
     second = "coarse: one pixel in " + std::to_string(frame->shrink * frame->shrink);
   else
-    second = counted(static_cast<std::uint64_t>(frame->samples), "sample") + ", " + duration(figures.sample_ms) +
-             " each, " + formatted("%.3g", figures.mrays_per_s) + " Mrays/s";
+    second = counted(static_cast<std::uint64_t>(frame->samples), "sample") + ", " +
+             duration(figures.sample_ms) + " each, " + formatted("%.3g", figures.mrays_per_s) + " Mrays/s";
   if (!figures.errors.empty()) second += ", RMSE " + formatted("%.2e", figures.errors.back().rmse);
 
   ImDrawList* draw = ImGui::GetWindowDrawList();
   const float pad = units(8), line = ImGui::GetFontSize(), letter = split ? units(28) : 0;
-  const float most = std::max(units(120), static_cast<float>(image_.width) * (split ? 0.5f : 1) - 2 * pad - units(8));
+  const float most =
+      std::max(units(120), static_cast<float>(image_.width) * (split ? 0.5f : 1) - 2 * pad - units(8));
   const float widest = most - letter - 2 * pad;
-  const auto size = [&](const std::string& text) { return ImGui::CalcTextSize(text.c_str(), nullptr, false, widest); };
+  const auto size = [&](const std::string& text) {
+    return ImGui::CalcTextSize(text.c_str(), nullptr, false, widest);
+  };
   const ImVec2 a = size(first), b = size(second);
-  const float wide = std::min(most, letter + std::max(a.x, b.x) + 2 * pad), high = a.y + b.y + 2 * pad + units(2);
+  const float wide = std::min(most, letter + std::max(a.x, b.x) + 2 * pad),
+              high = a.y + b.y + 2 * pad + units(2);
   const float x = side == 0 ? static_cast<float>(image_.x) + units(8)
                             : static_cast<float>(image_.x + image_.width) - wide - units(8);
   const float y = static_cast<float>(image_.y) + units(8);
   draw->AddRectFilled({x, y}, {x + wide, y + high}, shade, units(5));
   if (split) {
-    draw->AddRectFilled({x, y}, {x + letter, y + high}, side_colours[side], units(5), ImDrawFlags_RoundCornersLeft);
-    const ImVec2 glyph = fonts_.strong->CalcTextSizeA(units(17), 1e9f, 0, side_names[side]);
-    draw->AddText(fonts_.strong, units(17), {x + (letter - glyph.x) / 2, y + (high - glyph.y) / 2},
+    draw->AddRectFilled({x, y}, {x + letter, y + high}, side_colours[side], units(5),
+                        ImDrawFlags_RoundCornersLeft);
+    const ImVec2 glyph = fonts().strong->CalcTextSizeA(units(17), 1e9f, 0, side_names[side]);
+    draw->AddText(fonts().strong, units(17), {x + (letter - glyph.x) / 2, y + (high - glyph.y) / 2},
                   IM_COL32(10, 12, 16, 255), side_names[side]);
   }
-  draw->AddText(fonts_.text, line, {x + letter + pad, y + pad}, white, first.c_str(), nullptr, widest);
-  draw->AddText(fonts_.text, line, {x + letter + pad, y + pad + a.y + units(2)},
+  draw->AddText(fonts().text, line, {x + letter + pad, y + pad}, white, first.c_str(), nullptr, widest);
+  draw->AddText(fonts().text, line, {x + letter + pad, y + pad + a.y + units(2)},
                 failed ? colours::bad : grey, second.c_str(), nullptr, widest);
 
   // a heat map says what its colours mean
   if (frame && frame->display.heatmap && (side == 0 || !other || !other->display.heatmap)) {
-    ImGui::SetCursorScreenPos({static_cast<float>(image_.x) + units(16),
-                               static_cast<float>(image_.y + image_.height) - units(64)});
+    ImGui::SetCursorScreenPos(
+        {static_cast<float>(image_.x) + units(16), static_cast<float>(image_.y + image_.height) - units(64)});
     const ImVec2 at = ImGui::GetCursorScreenPos();
-    draw->AddRectFilled({at.x - units(8), at.y - units(8)}, {at.x + units(268), at.y + units(52)}, shade, units(5));
-    colour_bar({units(260), units(14)}, frame->display.most, frame->display.counted);
+    draw->AddRectFilled({at.x - units(8), at.y - units(8)}, {at.x + units(268), at.y + units(52)}, shade,
+                        units(5));
+    colour_bar({units(260), 0}, frame->display.most, frame->display.counted);
   }
 }
 
@@ -207,14 +218,14 @@ void Interface::difference() {
   const ImVec2 at{low.x + units(8), low.y + units(8)};
   draw->AddRectFilled(at, {at.x + wide, at.y + high_box}, shade, units(5));
   float y = at.y + pad;
-  draw->AddText(fonts_.strong, ImGui::GetFontSize(), {at.x + pad, y}, white, "Difference of A and B");
+  draw->AddText(fonts().strong, ImGui::GetFontSize(), {at.x + pad, y}, white, "Difference of A and B");
   y += line;
   if (!current) {
     draw->AddText({at.x + pad, y}, grey, "is being measured …");
     return;
   }
-  const std::string samples = counted(static_cast<std::uint64_t>(comparison->samples[0]), "sample") + " of A, " +
-                              std::to_string(comparison->samples[1]) + " of B";
+  const std::string samples = counted(static_cast<std::uint64_t>(comparison->samples[0]), "sample") +
+                              " of A, " + std::to_string(comparison->samples[1]) + " of B";
   draw->AddText({at.x + pad, y}, grey, samples.c_str());
   for (const auto& [measure, value] : comparison->measures) {
     y += line;
@@ -223,14 +234,15 @@ void Interface::difference() {
     draw->AddText({at.x + wide - pad - ImGui::CalcTextSize(number.c_str()).x, y}, white, number.c_str());
   }
   ImGui::SetCursorScreenPos({at.x + pad, y + line + units(6)});
-  colour_bar({wide - 2 * pad, units(14)}, comparison->scale, "mean |A − B| of a pixel's channels");
+  colour_bar({wide - 2 * pad, 0}, comparison->scale, "mean |A − B| of a pixel's channels");
 }
 
 // ---- over the image ----------------------------------------------------------
 
 void Interface::lines_over_image() {
   ImDrawList* draw = ImGui::GetWindowDrawList();
-  const Camera& camera = picture_.sides.empty() || !picture_.sides[0] ? session_.camera() : picture_.sides[0]->camera;
+  const Camera& camera =
+      picture_.sides.empty() || !picture_.sides[0] ? session_.camera() : picture_.sides[0]->camera;
   const auto stroke = [&](const Line& line, float thick) {
     const auto ends = projected(camera, image_.width, image_.height, line.from, line.to);
     if (!ends) return;
@@ -262,7 +274,8 @@ void Interface::pixel_card() {
   ImGui::SetNextWindowPos({static_cast<float>(image_.x + image_.width) - units(12),
                            static_cast<float>(image_.y + image_.height) - units(12)},
                           ImGuiCond_Always, {1, 1});
-  ImGui::SetNextWindowSizeConstraints({units(200), 0}, {units(460), static_cast<float>(image_.height) - units(24)});
+  ImGui::SetNextWindowSizeConstraints({units(200), 0},
+                                      {units(460), static_cast<float>(image_.height) - units(24)});
   ImGui::SetNextWindowBgAlpha(0.92f);
   ImGui::Begin("pixel", nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
@@ -270,7 +283,7 @@ void Interface::pixel_card() {
   ImGui::PushAllowKeyboardFocus(false);
   const std::string title = "Pixel " + std::to_string(pixel->x) + ", " + std::to_string(pixel->y) +
                             (session_.is_split() ? std::string(", side ") + side_names[pixel->side] : "");
-  ImGui::PushFont(fonts_.strong);
+  ImGui::PushFont(fonts().strong);
   ImGui::TextUnformatted(title.c_str());
   ImGui::PopFont();
   if (!pixel->answered) ImGui::TextDisabled("is being asked …");
@@ -299,7 +312,8 @@ void Interface::pixel_card() {
 
 void Interface::click(int x, int y) {
   if (x < 0 || y < 0 || x >= image_.width || y >= image_.height || picture_.sides.empty()) return;
-  const bool right = session_.is_split() && static_cast<float>(x) >= std::round(divider_ * static_cast<float>(image_.width));
+  const bool right =
+      session_.is_split() && static_cast<float>(x) >= std::round(divider_ * static_cast<float>(image_.width));
   pixel_ = std::make_shared<Pixel>();
   pixel_->x = x, pixel_->y = y, pixel_->side = right ? 1 : 0;
   session_.renderer().inspect(pixel_->side, x, y, [pixel = pixel_](const Inspection& inspection) {
@@ -311,7 +325,8 @@ void Interface::click(int x, int y) {
 
 void Interface::move_camera() {
   const ImGuiIO& io = ImGui::GetIO();
-  const float x = io.MousePos.x - static_cast<float>(image_.x), y = io.MousePos.y - static_cast<float>(image_.y);
+  const float x = io.MousePos.x - static_cast<float>(image_.x),
+              y = io.MousePos.y - static_cast<float>(image_.y);
   const float line = std::round(divider_ * static_cast<float>(image_.width));
   Camera camera = session_.camera();
   bool moves = false;
@@ -327,7 +342,8 @@ void Interface::move_camera() {
       divider_ = std::clamp(x / static_cast<float>(image_.width), 0.0f, 1.0f);
     } else if (dragged(0)) {
       const double angle = 2 * pi / units(1400);
-      camera = flying_ ? turned(camera, dx * angle / 2, -dy * angle / 2) : orbited(camera, -dx * angle, dy * angle);
+      camera = flying_ ? turned(camera, dx * angle / 2, -dy * angle / 2)
+                       : orbited(camera, -dx * angle, dy * angle);
       moves = true;
     } else if (dragged(1) || dragged(2)) {
       camera = panned(camera, dx, dy, image_.height);
@@ -348,7 +364,8 @@ void Interface::move_camera() {
   if (moves) {
     session_.set_camera(camera, true);
     moved_at_ = Clock::now();
-  } else if (moved_at_ && !ImGui::IsItemActive() && Clock::now() - *moved_at_ > std::chrono::milliseconds(120)) {
+  } else if (moved_at_ && !ImGui::IsItemActive() &&
+             Clock::now() - *moved_at_ > std::chrono::milliseconds(120)) {
     moved_at_.reset();
     session_.set_camera(session_.camera(), false);
   }
@@ -357,7 +374,8 @@ void Interface::move_camera() {
   const std::lock_guard lock(pixel_->mutex);
   if (pixel_->focus && pixel_->answered) {
     pixel_->focus = false;
-    if (pixel_->inspection.point) session_.set_camera(focused(session_.camera(), *pixel_->inspection.point), false);
+    if (pixel_->inspection.point)
+      session_.set_camera(focused(session_.camera(), *pixel_->inspection.point), false);
   }
 }
 
@@ -368,8 +386,8 @@ void Interface::fly() {
   if (right == 0 && up == 0 && forward == 0) return;
   const Camera& camera = session_.camera();
   // a second takes the eye once across what it looks at
-  const double step = glm::length(dvec3(camera.target) - dvec3(camera.eye)) * fly_speed_ * (io.KeyShift ? 4 : 1) *
-                      std::min(io.DeltaTime, 0.1f);
+  const double step = glm::length(dvec3(camera.target) - dvec3(camera.eye)) * fly_speed_ *
+                      (io.KeyShift ? 4 : 1) * std::min(io.DeltaTime, 0.1f);
   session_.set_camera(moved(camera, right * step, up * step, forward * step), true);
   moved_at_ = Clock::now();
 }

@@ -12,6 +12,7 @@
 #include "common/app/offscreen.h"
 #include "common/app/progress.h"
 #include "common/image/files.h"
+#include "common/whole_file.h"
 
 namespace trilha {
 namespace {
@@ -54,14 +55,6 @@ std::pair<int, int> size_of(const Options& options, float scale) {
 
 Window& window_of(GLFWwindow* window) { return *static_cast<Window*>(glfwGetWindowUserPointer(window)); }
 void wake(GLFWwindow* window) { window_of(window).interface().wake(); }
-
-/// A name that no file has yet: "NAME_1.png", "NAME_2.png", …
-std::string free_name(const std::string& name) {
-  for (int number = 1;; ++number) {
-    const std::string file = name + "_" + std::to_string(number) + ".png";
-    if (!std::filesystem::exists(file)) return file;
-  }
-}
 
 }  // namespace
 
@@ -177,7 +170,7 @@ bool Window::step() {
   draw(nullptr);
   if (s.interface->take_fullscreen()) s.fullscreen(glfwGetWindowMonitor(s.window.get()) == nullptr);
   if (s.interface->take_window_shot()) {
-    const std::string file = free_name(s.session->chapter() + "_window");
+    const std::string file = free_name(s.session->chapter() + "_window", ".png");
     try {
       write_image(file, image());
       s.session->notify("The window is in " + file);

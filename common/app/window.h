@@ -38,7 +38,9 @@ class Window {
   std::unique_ptr<State> state_;
 };
 
-/// Draws the window without a display, waits until its image is complete, and writes it to options.screenshot.
-void write_screenshot(const MakeDemo& make_demo, const Options& options, const std::vector<std::string>& settings);
+/// Draws the window without a display, waits until its image is complete, and writes it to
+/// options.screenshot.
+void write_screenshot(const MakeDemo& make_demo, const Options& options,
+                      const std::vector<std::string>& settings);
 
 }  // namespace trilha

@@ -293,6 +293,13 @@ struct Told {
     return generation;
   }
 
+  /// Wants it, and waits until all of it is there. Returns its generation.
+  std::uint64_t finish(const Wanted& wanted, double seconds = 20) {
+    const std::uint64_t generation = want(wanted);
+    REQUIRE(within(seconds, [&] { return is_complete(generation); }));
+    return generation;
+  }
+
   bool is_complete(std::uint64_t generation) const {
     const Picture picture = thread.picture();
     return picture.generation == generation && !picture.sides.empty() &&
@@ -367,8 +374,7 @@ TEST_CASE("a complete image is what a run without a window makes, bit for bit") 
     Wanted wanted = wish({side_of(told.make), side_of(told.make, {{"tint", "5"}, {"noise", "0.3"}})}, 5);
     wanted.jittered = jittered;
     wanted.seed = 7;
-    const auto generation = told.want(wanted);
-    REQUIRE(within(30, [&] { return told.is_complete(generation); }));
+    told.finish(wanted, 30);
     CHECK(told.fault_of_picture() == "");
     workshop.ns_per_pixel = 0;
     for (int i = 0; i < 2; ++i) {
@@ -391,8 +397,7 @@ TEST_CASE("a complete image of chapter 01 is what a run without a window makes, 
   wanted.scene = scene;
   wanted.camera = scene->camera;
   wanted.width = 160, wanted.height = 120;
-  const auto generation = told.want(wanted);
-  REQUIRE(within(60, [&] { return told.is_complete(generation); }));
+  told.finish(wanted, 60);
   CHECK(told.fault_of_picture() == "");
   for (int i = 0; i < 2; ++i) {
     Display display;
@@ -414,7 +419,6 @@ TEST_CASE("after 200 random wishes in a row every frame is what it says, and the
   told.make = fakes(quick);
   Random random(3);
   Wanted wanted = wish({side_of(make)}, 2);
-  std::uint64_t generation = 0;
   const auto random_side = [&] {
     return side_of(make, {{"tint", std::to_string(random.index(4))},
                           {"gain", random.index(2) == 0 ? "1" : "0.5"},
@@ -450,7 +454,7 @@ TEST_CASE("after 200 random wishes in a row every frame is what it says, and the
     }
     wanted.moving = random.index(2) == 0;
     wanted.paused = random.index(10) == 0;
-    generation = told.want(wanted);
+    told.want(wanted);
     const auto until = Clock::now() + std::chrono::milliseconds(random.index(60));
     do {
       const std::string fault = told.fault_of_picture();
@@ -459,8 +463,7 @@ TEST_CASE("after 200 random wishes in a row every frame is what it says, and the
     } while (Clock::now() < until);
   }
   wanted.paused = wanted.moving = false;
-  generation = told.want(wanted);
-  REQUIRE(within(30, [&] { return told.is_complete(generation); }));
+  told.finish(wanted, 30);
   CHECK(told.fault_of_picture() == "");
   CHECK(told.looked_at > 100);  // else nothing was looked at
   const Picture picture = told.thread.picture();
@@ -589,8 +592,7 @@ TEST_CASE("where a side fails it says why, and the other goes on") {
     Told told(fakes(workshop));
     const Wanted::Side good = side_of(told.make), bad = side_of(told.make, {{"fails", when}});
     Wanted wanted = wish({good, bad}, 3);
-    auto generation = told.want(wanted);
-    REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+    auto generation = told.finish(wanted);
     Picture picture = told.thread.picture();
     REQUIRE(picture.sides.size() == 2);
     CHECK(picture.sides[0]);
@@ -602,8 +604,7 @@ TEST_CASE("where a side fails it says why, and the other goes on") {
     CHECK(error.find("cannot be") != std::string::npos);
 
     wanted.camera.eye.x = 3;  // the other one still follows
-    generation = told.want(wanted);
-    REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+    generation = told.finish(wanted);
     CHECK(told.thread.picture().sides[0]->camera.eye.x == 3);
 
     wanted.sides[1] = good;
@@ -618,7 +619,7 @@ TEST_CASE("where a side fails it says why, and the other goes on") {
 TEST_CASE("a pause loses nothing, and does nothing") {
   require_meaningful_times();
   Workshop workshop;
-  workshop.ns_per_pixel = 100000;  // 300 ms a sample
+  workshop.ns_per_pixel = 50000 * thread_count();  // 300 ms a sample
   Told told(fakes(workshop));
   Wanted wanted = wish({side_of(told.make)}, 4);
   told.want(wanted);
@@ -635,8 +636,7 @@ TEST_CASE("a pause loses nothing, and does nothing") {
   CHECK(told.thread.picture().sides.size() == 1);
   const int builds = workshop.builds;
   wanted.paused = false;
-  const auto generation = told.want(wanted);
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  told.finish(wanted);
   workshop.ns_per_pixel = 0;
   CHECK(told.fault_of_picture() == "");
   CHECK(workshop.builds == builds + 1);  // of the headless run
@@ -691,12 +691,10 @@ TEST_CASE("sides that change places keep their builds and samples") {
   Workshop workshop;
   Told told(fakes(workshop));
   Wanted wanted = wish({side_of(told.make), side_of(told.make, {{"tint", "2"}})}, 3);
-  auto generation = told.want(wanted);
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  told.finish(wanted);
   const int builds = workshop.builds;
   std::swap(wanted.sides[0], wanted.sides[1]);
-  generation = told.want(wanted);
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  told.finish(wanted);
   CHECK(workshop.builds == builds);
   const Picture picture = told.thread.picture();
   for (std::size_t i = 0; i < 2; ++i) CHECK(picture.sides[i]->side == wanted.sides[i]);
@@ -708,13 +706,11 @@ TEST_CASE("more samples go on from those that are there, fewer begin again") {
   Workshop workshop;
   Told told(fakes(workshop));
   Wanted wanted = wish({side_of(told.make)}, 3);
-  auto generation = told.want(wanted);
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  told.finish(wanted);
   const double before = told.thread.figures(0).render_ms;
   for (const int samples : {9, 4}) {
     wanted.samples = samples;
-    generation = told.want(wanted);
-    REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+    told.finish(wanted);
     CHECK(told.thread.picture().sides[0]->samples == samples);
     CHECK(told.fault_of_picture() == "");
     if (samples == 9) CHECK(told.thread.figures(0).render_ms > before);
@@ -726,13 +722,11 @@ TEST_CASE("a setting of no effect loses nothing, and is in the next frame") {
   Workshop workshop;
   Told told(fakes(workshop));
   Wanted wanted = wish({side_of(told.make)}, 3);
-  auto generation = told.want(wanted);
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  told.finish(wanted);
   const double ms = told.thread.figures(0).render_ms;
   const int builds = workshop.builds;
   wanted.sides[0] = side_of(told.make, {{"label", "4"}});
-  generation = told.want(wanted);
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  told.finish(wanted);
   CHECK(told.thread.picture().sides[0]->side == wanted.sides[0]);
   CHECK(told.thread.figures(0).render_ms == ms);
   CHECK(workshop.builds == builds);
@@ -764,7 +758,9 @@ TEST_CASE("what is not needed is freed") {
     wanted.difference = false;
     wanted.reference_samples = 0;
     generation = told.want(wanted);
-    CHECK(within(20, [&] { return is_done() && live_bytes(Backend::cpu) <= of_one; }));
+    // of the frames that nobody holds one may be kept for the next, at one moment and not at the other
+    const std::size_t a_frame = wanted.width * wanted.height * sizeof(PackedPixel);
+    CHECK(within(20, [&] { return is_done() && live_bytes(Backend::cpu) <= of_one + a_frame; }));
     CHECK(workshop.demos == 2);  // A's, and the one for the declarations
     const auto figures = told.thread.figures(0);
     std::map<std::string, std::size_t> bytes(figures.bytes.begin(), figures.bytes.end());
@@ -784,14 +780,12 @@ TEST_CASE("a frame that is held stays as it is") {
   {
     Told told(fakes(workshop));
     Wanted wanted = wish({side_of(told.make)}, 3);
-    auto generation = told.want(wanted);
-    REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+    told.finish(wanted);
     held = told.thread.picture().sides[0];
     pixels = held->pixels.to_vector(Backend::cpu);
     for (int k = 1; k < 10; ++k) {
       wanted.camera.eye.x = static_cast<float>(k);
-      generation = told.want(wanted);
-      REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+      told.finish(wanted);
       CHECK(held->pixels.to_vector(Backend::cpu) == pixels);
     }
   }
@@ -939,6 +933,7 @@ TEST_CASE("the overlay has the lines of its level") {
     wanted.overlay_level = level;
     told.want(wanted);
     CHECK(within(10, [&] { return told.thread.overlay().size() == static_cast<std::size_t>(level + 1); }));
+    CHECK(told.thread.figures(0).overlay_levels == 3);
   }
 }
 
@@ -947,8 +942,7 @@ TEST_CASE("what was left out is told, and measured when asked") {
   Workshop workshop;
   Told told(fakes(workshop));
   Wanted wanted = wish({side_of(told.make)}, 3);
-  const auto generation = told.want(wanted);
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  const auto generation = told.finish(wanted);
   REQUIRE(told.thread.figures(0).left_out.size() == 1);
   CHECK(told.thread.figures(0).left_out[0].omission.what == "a spare buffer");
   CHECK(!told.thread.figures(0).left_out[0].ms);
@@ -980,8 +974,7 @@ TEST_CASE("the end comes at once") {
 TEST_CASE("rendering has a lower priority than the thread that asks for it") {
   Workshop workshop;
   Told told(fakes(workshop));
-  const auto generation = told.want(wish({side_of(told.make)}, 2));
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  told.finish(wish({side_of(told.make)}, 2));
   const auto nice_of = [](const std::filesystem::path& task) {
     std::ifstream in(task / "stat");
     const std::string text{std::istreambuf_iterator<char>(in), {}};
@@ -1002,16 +995,14 @@ TEST_CASE("an image of no size is not rendered, and one that comes back goes on"
   Workshop workshop;
   Told told(fakes(workshop));
   Wanted wanted = wish({side_of(told.make)}, 3);
-  auto generation = told.want(wanted);
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  auto generation = told.finish(wanted);
   const double ms = told.thread.figures(0).render_ms;
   Wanted hidden = wanted;
   hidden.width = hidden.height = 0;
   generation = told.want(hidden);
   REQUIRE(within(20, [&] { return told.thread.activity().generation == generation; }));
   CHECK(told.thread.picture().sides.size() == 1);
-  generation = told.want(wanted);
-  REQUIRE(within(20, [&] { return told.is_complete(generation); }));
+  generation = told.finish(wanted);
   CHECK(told.thread.figures(0).render_ms == ms);
 }
 

@@ -53,7 +53,8 @@ class Driver {
     const auto start = std::chrono::steady_clock::now();
     while (!holds()) {
       frames(1);
-      if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds) return false;
+      if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds)
+        return false;
     }
     return true;
   }
@@ -85,9 +86,7 @@ class Driver {
     hand_->button(button, false);
     frames(2);
   }
-  void click(double x, double y, unsigned button = 1) {
-    move(x, y), press(button), release(button);
-  }
+  void click(double x, double y, unsigned button = 1) { move(x, y), press(button), release(button); }
   void click(const std::string& name, double across = 0.5) {
     const PixelRect r = widget(name);
     click(r.x + across * r.width, r.y + 0.5 * r.height);
@@ -115,8 +114,9 @@ class Driver {
     Image part{area.width, area.height, Encoding::display, {}};
     for (int y = 0; y < area.height; ++y)
       for (int x = 0; x < area.width; ++x)
-        part.pixels.push_back(all.pixels[static_cast<std::size_t>(area.y + y) * static_cast<std::size_t>(all.width) +
-                                         static_cast<std::size_t>(area.x + x)]);
+        part.pixels.push_back(
+            all.pixels[static_cast<std::size_t>(area.y + y) * static_cast<std::size_t>(all.width) +
+                       static_cast<std::size_t>(area.x + x)]);
     return part;
   }
 

@@ -97,6 +97,9 @@ PackedPixel packed(const vec3& colour) {
          static_cast<PackedPixel>(to_byte(colour.z)) << 16 | 0xff000000u;
 }
 
+/// A grey that is a byte: of a half some drivers make 127, others 128.
+constexpr float grey = 128 / 255.0f;
+
 /// Draws the texture, pixel by pixel, at 5, 3 on grey. Returns how many pixels are wrong: none of the picture
 /// may differ in a byte, and none beside it may have changed.
 std::size_t wrong_pixels(Gui& gui, Offscreen& offscreen, const FrameTexture& texture,
@@ -110,9 +113,9 @@ std::size_t wrong_pixels(Gui& gui, Offscreen& offscreen, const FrameTexture& tex
             reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(texture.texture())), ImVec2(left, top),
             ImVec2(static_cast<float>(left + width), static_cast<float>(top + height)));
       },
-      0.5f);
+      grey);
   const Image image = offscreen.image();
-  const PackedPixel ground = packed(vec3(0.5f));
+  const PackedPixel ground = packed(vec3(grey));
   std::size_t wrong = 0, i = 0;
   for (int y = -top; y < image.height - top; ++y)
     for (int x = -left; x < image.width - left; ++x) {
@@ -221,7 +224,7 @@ TEST_CASE("transparent pixels let the ground through") {
   for (std::size_t i = 0; i < pixels.size(); i += 2) pixels[i] = 0;
   texture.show(frame_of(pixels, 9, 7));
   for (PackedPixel& pixel : pixels)
-    if (pixel == 0) pixel = packed(vec3(0.5f));
+    if (pixel == 0) pixel = packed(vec3(grey));
   CHECK(wrong_pixels(gui, offscreen, texture, pixels) == 0);
   check_graphics();
 }
@@ -301,7 +304,9 @@ TEST_CASE("errors of OpenGL are reported once") {
     }
     UNSCOPED_INFO(text);
     CHECK(text.find("OpenGL: ") == 0);
-    CHECK(text.find(debug ? "glEnable" : "GL_INVALID_ENUM") != std::string::npos);
+    // with a debug context the driver says it, in words of its own: Mesa names the call, NVIDIA the error
+    CHECK((text.find("GL_INVALID_ENUM") != std::string::npos ||
+           (debug && text.find("glEnable") != std::string::npos)));
     CHECK(text.find('\n') == std::string::npos);
     check_graphics();
     glEnable(0xdead);

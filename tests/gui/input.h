@@ -9,7 +9,6 @@
 #include <stdexcept>
 #include <string>
 
-
 namespace trilha::testing {
 
 class Hand {
@@ -32,7 +31,8 @@ class Hand {
     XSync(display_, False);
   }
   void wheel(int steps) {
-    for (int i = 0; i < std::abs(steps); ++i) button(steps > 0 ? 4 : 5, true), button(steps > 0 ? 4 : 5, false);
+    for (int i = 0; i < std::abs(steps); ++i)
+      button(steps > 0 ? 4 : 5, true), button(steps > 0 ? 4 : 5, false);
   }
   void key(KeySym symbol, bool down) {
     const KeyCode code = XKeysymToKeycode(display_, symbol);

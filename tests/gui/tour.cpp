@@ -1,5 +1,5 @@
-// Not a test: drives the window through what a class is shown, without a display, and writes a picture a frame. The
-// README's animation is made of these: see docs/window.md.
+// Not a test: drives the window through what a class is shown, without a display, and writes a picture a
+// frame. The README's animation is made of these: see docs/window.md.
 
 #include <cmath>
 #include <cstdio>
@@ -18,7 +18,8 @@ namespace {
 
 using namespace trilha;
 
-/// A film of the window: its clock is the number of frames, so that it plays smoothly however slow this machine is.
+/// A film of the window: its clock is the number of frames, so that it plays smoothly however slow this
+/// machine is.
 class Tour {
  public:
   Tour(std::string folder, const Options& options, const std::vector<std::string>& settings)
@@ -35,7 +36,8 @@ class Tour {
   /// Waits until the image is complete, off the film, and then films `seconds` of it.
   void wait(double seconds, bool until_complete = true) {
     for (int i = 0; i < 3; ++i) draw();
-    while (until_complete && !interface_.complete()) draw(), std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    while (until_complete && !interface_.complete())
+      draw(), std::this_thread::sleep_for(std::chrono::milliseconds(20));
     film(seconds);
   }
   void film(double seconds) {
@@ -57,7 +59,7 @@ class Tour {
     if (found == interface_.widgets().end()) throw InputError("the window has no " + widget);
     const PixelRect& r = found->second;
     glide({static_cast<float>(r.x) + across * static_cast<float>(r.width),
-        static_cast<float>(r.y) + 0.5f * static_cast<float>(r.height)});
+           static_cast<float>(r.y) + 0.5f * static_cast<float>(r.height)});
   }
   void press(bool down) {
     ImGui::GetIO().MouseDown[0] = down;
@@ -96,10 +98,10 @@ class Tour {
 };
 
 int run(int argc, char** argv) {
-  if (argc != 2) throw UsageError("window_tour FOLDER: writes frame_0000.png and so on into a folder that exists");
+  if (argc != 2)
+    throw UsageError("window_tour FOLDER: writes frame_0000.png and so on into a folder that exists");
   Options options;
   options.scene = "teapot";
-  options.backend = Backend::cpu;
   options.samples = 4;
   options.window_width = 1040, options.window_height = 640;
   options.scale = 1;

@@ -32,7 +32,8 @@ std::size_t differing(const Image& a, const Image& b, int first, int last) {
   std::size_t n = 0;
   for (int y = 0; y < a.height; ++y)
     for (int x = first; x < last; ++x) {
-      const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(a.width) + static_cast<std::size_t>(x);
+      const std::size_t i =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(a.width) + static_cast<std::size_t>(x);
       n += a.pixels[i] != b.pixels[i];
     }
   return n;
@@ -54,8 +55,8 @@ void bare(Driver& driver) {
 
 }  // namespace
 
-// Catches: an image on the screen that is not what the program renders: another camera, size, sample, colour, row order,
-// filter, or a command that was copied and says something else.
+// Catches: an image on the screen that is not what the program renders: another camera, size, sample, colour,
+// row order, filter, or a command that was copied and says something else.
 TEST_CASE("the image area equals the headless render, pixel for pixel") {
   Driver driver(with(small, {"--samples", "2"}));
   bare(driver);
@@ -64,7 +65,8 @@ TEST_CASE("the image area equals the headless render, pixel for pixel") {
   for (int trial = 0; trial < 6; ++trial) {
     Session& session = driver.session();
     session.set(0, "test", any({"plane", "moller-trumbore", "baldwin-weber", "watertight"}));
-    session.set(0, "shading", any({"lambert", "normals", "depth", "primitive", "barycentrics", "facing", "tests"}));
+    session.set(0, "shading",
+                any({"lambert", "normals", "depth", "primitive", "barycentrics", "facing", "tests"}));
     session.set(0, "scalar", any({"float", "double"}));
     session.set(0, "one-sided", any({"true", "false"}));
     session.set(0, "smooth", any({"true", "false"}));
@@ -106,8 +108,8 @@ TEST_CASE("left of the divider is A, right of it is B, each as the program rende
   CHECK(differing(a, b, 0, shown.width) > 1000);
 }
 
-// Catches: a widget that does not change its setting, changes another, or leaves its range; an OpenGL error in some state
-// (each frame checks); a menu that crashes.
+// Catches: a widget that does not change its setting, changes another, or leaves its range; an OpenGL error
+// in some state (each frame checks); a menu that crashes.
 TEST_CASE("every widget of the panel over its range") {
   Driver driver({"--scene", "teapot", "--backend", "cpu", "--window-size", "1200x1700", "--samples", "1"});
   for (const int side : {0, 1}) {
@@ -157,10 +159,12 @@ TEST_CASE("every widget of the panel over its range") {
   CHECK(driver.session().samples() == 65536);
   driver.drag(samples.x + samples.width / 2, samples.y + 10, samples.x - 20, samples.y + 10);
   CHECK(driver.session().samples() == 1);
-  for (const char* name : {"button Exchange", "button Take all", "button Pause", "button Pause", "button Difference",
-                           "button Difference", "button Reference", "button Reference", "button Help", "button Help"})
+  for (const char* name :
+       {"button Exchange", "button Take all", "button Pause", "button Pause", "button Difference",
+        "button Difference", "button Reference", "button Reference", "button Help", "button Help"})
     driver.click(name), driver.frames(3);
-  for (const char* heading : {"heading Memory", "heading Left out, side B", "heading Figures", "heading Figures"})
+  for (const char* heading :
+       {"heading Memory", "heading Left out, side B", "heading Figures", "heading Figures"})
     driver.click(heading, 0.3), driver.frames(3);
   for (const char* name : {"menu Scene", "menu View", "menu Presets"}) {
     driver.click(name);
@@ -170,8 +174,8 @@ TEST_CASE("every widget of the panel over its range") {
   }
 }
 
-// Catches: a camera that does not follow the hand, or does after the hand has let go; a click that turns; a pixel that is
-// asked but not shown.
+// Catches: a camera that does not follow the hand, or does after the hand has let go; a click that turns; a
+// pixel that is asked but not shown.
 TEST_CASE("the mouse turns, moves and asks") {
   Driver driver(with(small, {"--samples", "1", "--size", "500x400"}));
   Session& session = driver.session();
@@ -274,10 +278,24 @@ TEST_CASE("a preset is typed, kept and taken up again") {
   driver.click("preset sx");
   CHECK(session.side(0).settings["shading"].text() == "normals");
   CHECK(session.side(0).settings["test"].text() == "plane");
+  // under the same name only by the button, which says that it replaces
+  session.set(0, "shading", "depth");
+  driver.frames(2);
+  if (!driver.has("text preset")) driver.click("menu Presets");
+  driver.click("text preset");
+  driver.type("sx");
+  driver.key(XK_Return);
+  session.load_preset(0, "sx");
+  CHECK(session.side(0).settings["shading"].text() == "normals");
+  session.set(0, "shading", "depth");
+  driver.frames(2);
+  driver.click("button Keep these settings");
+  session.load_preset(0, "sx");
+  CHECK(session.side(0).settings["shading"].text() == "depth");
 }
 
-// Catches: an interface that waits for the renderer, a change that is long without an answer. The limits are those of the
-// contract, on two cores that render all the time.
+// Catches: an interface that waits for the renderer, a change that is long without an answer. The limits are
+// those of the contract, on two cores that render all the time.
 TEST_CASE("the window answers while every core renders") {
   require_meaningful_times();
   Driver driver({"--scene", "sphereflake", "--backend", "cpu", "--window-size", "1280x720"});
@@ -289,11 +307,13 @@ TEST_CASE("the window answers while every core renders") {
     std::sort(ms.begin(), ms.end());
     return ms.empty() ? 0 : ms[static_cast<std::size_t>(part * static_cast<double>(ms.size() - 1))];
   };
-  std::printf("frame: median %.1f ms, 99%% %.1f ms (%zu); drawing: median %.1f ms; latency: median %.1f ms, 99%% %.1f ms "
-              "(%zu); cancelled in %.1f ms\n",
-              at(times.frame, 0.5), at(times.frame, 0.99), times.frame.size(), at(times.drawing, 0.5),
-              at(times.latency, 0.5), at(times.latency, 0.99), times.latency.size(),
-              driver.session().renderer().activity().cancel_ms);
+  std::printf(
+      "frame: median %.1f ms, 99%% %.1f ms (%zu); drawing: median %.1f ms; latency: median %.1f ms, 99%% "
+      "%.1f ms "
+      "(%zu); cancelled in %.1f ms\n",
+      at(times.frame, 0.5), at(times.frame, 0.99), times.frame.size(), at(times.drawing, 0.5),
+      at(times.latency, 0.5), at(times.latency, 0.99), times.latency.size(),
+      driver.session().renderer().activity().cancel_ms);
   CHECK(times.frame.size() > 100);
   CHECK(at(times.frame, 0.5) < 50);
   CHECK(times.latency.size() > 50);
@@ -302,8 +322,8 @@ TEST_CASE("the window answers while every core renders") {
 
 // Catches: an image that is scaled or cut on a large screen, text that does not grow with it.
 TEST_CASE("a screen of 3840x2160 pixels at scale 2 shows as many") {
-  Driver driver({"--scene", "teapot", "--backend", "cpu", "--window-size", "3840x2160", "--scale", "2", "--samples", "1",
-                 "--shading", "normals"});
+  Driver driver({"--scene", "teapot", "--backend", "cpu", "--window-size", "3840x2160", "--scale", "2",
+                 "--samples", "1", "--shading", "normals"});
   bare(driver);
   REQUIRE(driver.until_complete(280));
   const Image shown = driver.image_area();
@@ -325,7 +345,8 @@ TEST_CASE("without a display the program says so and renders to a file") {
 TEST_CASE("a first scene that is refused ends the program with its reason") {
   VirtualDisplay display;
   Folder folder;
-  const Result result = run("/usr/bin/env", folder, "DISPLAY=" + display.name() + " '" + program() + "' --scene missing.obj");
+  const Result result =
+      run("/usr/bin/env", folder, "DISPLAY=" + display.name() + " '" + program() + "' --scene missing.obj");
   CHECK(result.code == 1);
   CHECK(result.err.find("missing.obj") != std::string::npos);
 }
@@ -334,7 +355,8 @@ TEST_CASE("a first scene that is refused ends the program with its reason") {
 TEST_CASE("the window is drawn to a file without a display") {
   Folder folder;
   const Result result =
-      run(program(), folder, "--scene teapot --samples 1 --backend cpu --screenshot {}/window.png --window-size 1280x720");
+      run(program(), folder,
+          "--scene teapot --samples 1 --backend cpu --screenshot {}/window.png --window-size 1280x720");
   INFO(result.err);
   REQUIRE(result.code == 0);
   const Image image = read_image(folder / "window.png");
