@@ -301,7 +301,7 @@ void Interface::pixel_card() {
   ImGui::PopStyleVar();
   ImGui::BeginDisabled(!pixel->inspection.point);
   if (ImGui::Button("Look at it (F)")) pixel->focus = true;
-  mark("button Look at it");
+  if (pixel->inspection.point) mark("button Look at it");
   ImGui::EndDisabled();
   ImGui::SameLine();
   if (ImGui::Button("Close (Esc)")) pixel_.reset();

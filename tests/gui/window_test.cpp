@@ -39,7 +39,8 @@ std::size_t differing(const Image& a, const Image& b, int first, int last) {
   return n;
 }
 
-const std::vector<std::string> small = {"--scene", "teapot", "--backend", "cpu", "--window-size", "1100x900"};
+const std::vector<std::string> small = {"--scene", "cornell_box",   "--backend",
+                                        "cpu",     "--window-size", "1100x900"};
 
 std::vector<std::string> with(std::vector<std::string> flags, const std::vector<std::string>& more) {
   flags.insert(flags.end(), more.begin(), more.end());
@@ -111,7 +112,8 @@ TEST_CASE("left of the divider is A, right of it is B, each as the program rende
 // Catches: a widget that does not change its setting, changes another, or leaves its range; an OpenGL error
 // in some state (each frame checks); a menu that crashes.
 TEST_CASE("every widget of the panel over its range") {
-  Driver driver({"--scene", "teapot", "--backend", "cpu", "--window-size", "1200x1700", "--samples", "1"});
+  Driver driver(
+      {"--scene", "cornell_box", "--backend", "cpu", "--window-size", "1200x1700", "--samples", "1"});
   for (const int side : {0, 1}) {
     const std::string letter = side == 0 ? "A" : "B";
     if (side == 1) {
@@ -203,13 +205,14 @@ TEST_CASE("the mouse turns, moves and asks") {
   driver.click(area.x + area.width / 2, area.y + area.height / 2);
   CHECK(session.camera().eye == first.eye);
   REQUIRE(driver.until([&] { return driver.has("button Look at it"); }, 10));
+  driver.frames(3);  // the card has grown
   driver.click("button Look at it");
 
   driver.frames(5);
   CHECK(session.camera().eye == first.eye);
   CHECK(session.camera().target != first.target);
   driver.key(XK_Escape);
-  CHECK_FALSE(driver.has("button Look at it"));
+  CHECK_FALSE(driver.has("button Close pixel"));
 }
 
 // Catches: a key of the help page that does nothing, or does another thing.
@@ -322,7 +325,7 @@ TEST_CASE("the window answers while every core renders") {
 
 // Catches: an image that is scaled or cut on a large screen, text that does not grow with it.
 TEST_CASE("a screen of 3840x2160 pixels at scale 2 shows as many") {
-  Driver driver({"--scene", "teapot", "--backend", "cpu", "--window-size", "3840x2160", "--scale", "2",
+  Driver driver({"--scene", "cornell_box", "--backend", "cpu", "--window-size", "3840x2160", "--scale", "2",
                  "--samples", "1", "--shading", "normals"});
   bare(driver);
   REQUIRE(driver.until_complete(280));
@@ -356,7 +359,7 @@ TEST_CASE("the window is drawn to a file without a display") {
   Folder folder;
   const Result result =
       run(program(), folder,
-          "--scene teapot --samples 1 --backend cpu --screenshot {}/window.png --window-size 1280x720");
+          "--scene cornell_box --samples 1 --backend cpu --screenshot {}/window.png --window-size 1280x720");
   INFO(result.err);
   REQUIRE(result.code == 0);
   const Image image = read_image(folder / "window.png");
