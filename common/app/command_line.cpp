@@ -326,6 +326,9 @@ CommandLine::CommandLine(Demo& demo, Settings& settings, Options& options)
   app.add_option("--split", options.split, "open the window split; B's settings come from a file of flags")
       ->type_name("FILE")
       ->configurable(false);
+  app.add_option("--reference", options.reference,
+                 "open the window with a reference of so many samples, and tell errors against it")
+      ->type_name("N");
   app.add_flag("--fullscreen", options.fullscreen, "open the window over the whole screen");
   app.add_option("--screenshot", options.screenshot,
                  "draw the window as it is once the image is complete, without a display, to a file")
@@ -375,7 +378,8 @@ void CommandLine::check_parts() const {
       {"--time", options_.seconds > 0}, {"--json", options_.json},
       {"--explain", options_.explain},  {"--sweep", !options_.sweeps.empty()},
   };
-  for (const char* flag : {"--split", "--fullscreen", "--screenshot", "--window-size", "--scale"})
+  for (const char* flag :
+       {"--split", "--reference", "--fullscreen", "--screenshot", "--window-size", "--scale"})
     for (const auto& [other, there] : without_window)
       if (there && app_.get_option(flag)->count() > 0)
         throw UsageError(std::string(flag) + " is about the window, and with " + other +
@@ -417,6 +421,7 @@ void CommandLine::check() {
     require("--fov", *options_.field_of_view, 0.001f, 179.0f);
   }
   if (options_.samples) require("--samples", *options_.samples, 1, most_samples);
+  require("--reference", options_.reference, 0, most_samples);
   require("--time", options_.seconds, 0.0, 1e6);
   require("--threads", options_.threads, 0, 1024);
   require("--report-budget", options_.report_budget, 1.0, 1e6);

@@ -32,7 +32,8 @@ struct Options {
   bool headless = false;
   std::string split;  ///< a file of flags: the window opens split, B's settings come from there
   bool fullscreen = false;
-  std::string screenshot;                   ///< the window is drawn without a display, to this PNG; empty: no
+  int reference = 0;       ///< the window begins with a reference of so many samples; 0: with none
+  std::string screenshot;  ///< the window is drawn without a display, to this PNG; empty: no
   int window_width = 0, window_height = 0;  ///< 0: to suit --size, else 1280×720
   float scale = 0;                          ///< of everything in the window; 0: as the screen has it
   bool explain = false, json = false, quiet = false, list_settings = false, list_scenes = false;

@@ -144,7 +144,8 @@ struct Side {
 
 /// An image that errors are told against, in two halves of other random numbers than the sides have.
 struct Reference {
-  Wanted wanted;                                                         ///< when it was begun
+  Wanted wanted;      ///< when it was begun
+  Wanted::Side side;  ///< A's settings, of which it is made
   std::unique_ptr<Technique> technique = std::make_unique<Technique>();  ///< null at the end
   std::uint64_t seeds[2];
   Exposure halves[2];
@@ -311,7 +312,8 @@ struct RenderThread::State {
     enum class Kind { inspect, image, savings };
     Kind kind;
     int side;
-    int x, y;
+    Camera camera;  ///< of the picture that was looked at, as the size is
+    int width, height, x, y;
     std::function<void(const Inspection&)> inspected;
     std::function<void(const Image&, int, const std::string&)> imaged;
     std::uint64_t generation;
@@ -363,6 +365,7 @@ struct RenderThread::State {
   int overlay_level = -1;
   std::uint64_t overlay_build = 0;
   std::uint64_t comparable = 0;
+  bool warm[2] = {};  ///< has that backend built anything?
   struct Compared {
     std::uint64_t comparable = 0;
     int samples = 0;
@@ -553,6 +556,10 @@ struct RenderThread::State {
         lock.unlock();
         serve_requests(&job);
         lock.lock();
+      } else if (newest.on_hold() && newest.generation != now.generation) {
+        // it is to be followed, even so: at once where nothing is lost by it, else once this sample is
+        // complete
+        return !job.interruptible;
       } else if (newest.on_hold()) {
         lock.unlock();
         say("paused", 0, true);
@@ -619,7 +626,6 @@ struct RenderThread::State {
     }
     if (other_looks) forget_comparison();
     check_reference();
-    drop_requests(effects);
     for (std::size_t i = 0; i < sides.size(); ++i) post_figures(i);
     post_picture();
     board->say_changed();
@@ -775,8 +781,12 @@ struct RenderThread::State {
       const std::shared_ptr<const Scene> before = std::exchange(technique.scene, now.wanted.scene);
       Job job{Job::Kind::build, static_cast<int>(i)};
       double ms = 0;
-      const bool done =
-          run_job(job, [&] { ms = timed_build(*technique.demo, *technique.scene, *technique.stream); });
+      const bool done = run_job(job, [&] {
+        ms = timed_build(*technique.demo, *technique.scene, *technique.stream);
+        // a machine's first build has what it does once, such as loading its code, in its time
+        if (!std::exchange(warm[side.technique.side.backend == Backend::cuda], true) && ms < soon_ms * 5)
+          ms = timed_build(*technique.demo, *technique.scene, *technique.stream);
+      });
       side.structure_bytes = foreign_bytes(side) - others;
       side.working_bytes = 0;
       if (!done) return;
@@ -920,7 +930,7 @@ struct RenderThread::State {
       const auto between = [&](double fraction, double spent) {
         say("rendering", progress(fraction), false);
         if (side.full.samples > 0) return true;
-        if (side.level > 0) {
+        if (side.coarsely && side.level > 0) {
           if (milliseconds(side.published_at) > std::max(partial_frame_ms, frame_share * side.publish_ms) &&
               fraction < 1)
             publish(side, *side.full.film, &*side.coarse, 0, 1 << side.level);
@@ -1083,6 +1093,7 @@ struct RenderThread::State {
     Board::Side& shown = board->sides[i];
     if (shown.run == side.run) {
       figures.errors = std::move(shown.figures.errors);
+      figures.reference_differs = std::move(shown.figures.reference_differs);
       figures.histogram = std::move(shown.figures.histogram);
     }
     shown.run = side.run;
@@ -1169,10 +1180,14 @@ struct RenderThread::State {
         board->say_changed();
       });
     const auto tell_error = [board = board, film, display, run, truth = reference->truth, samples,
-                             ms = side.render_ms] {
+                             ms = side.render_ms, other = differences_from_reference(side)] {
       if (truth->image.pixels.empty()) return;  // it has failed, which was said
       const double error = rmse(developed(*film, display, Backend::cpu), truth->image).value;
-      board->change_figures(run, [&](Figures& figures) { figures.errors.push_back({samples, ms, error}); });
+      board->change_figures(run, [&](Figures& figures) {
+        if (board->truth != truth) return;  // that reference is gone, and its curve with it
+        figures.errors.push_back({samples, ms, error});
+        figures.reference_differs = other;
+      });
       board->say_changed();
     };
     measure_beside(key, most_waiting(), tell_error);
@@ -1301,7 +1316,8 @@ struct RenderThread::State {
   void drop_reference() {
     reference.reset();
     for (const auto& side : sides)
-      board->change_figures(side->run, [](Figures& figures) { figures.errors.clear(); });
+      board->change_figures(
+          side->run, [](Figures& figures) { figures.errors.clear(), figures.reference_differs.clear(); });
     const std::lock_guard lock(board->mutex);
     board->activity.reference_samples = 0;
     board->activity.reference_ready = false;
@@ -1313,6 +1329,7 @@ struct RenderThread::State {
   void begin_reference(std::unique_ptr<Technique> technique) {
     reference = std::make_unique<Reference>();
     reference->wanted = now.wanted;
+    reference->side = now.wanted.sides[0];
     reference->technique = std::move(technique);
     // far from the seeds that people take, which are small, and from their neighbours
     reference->seeds[0] = now.wanted.seed ^ std::uint64_t{1} << 63;
@@ -1321,15 +1338,50 @@ struct RenderThread::State {
     board->truth = reference->truth;
   }
 
+  /// What the settings become that a reference of them is made with.
+  std::vector<std::string> exact(const std::vector<std::string>& texts) const {
+    const auto demo = make_demo();
+    Settings settings;
+    demo->declare_settings(settings);
+    settings.set_texts(texts);
+    demo->make_exact();
+    return settings.texts();
+  }
+
+  /// The settings of the reference in which the side, made as exact, would be another: it may be of another
+  /// picture then, and the error is no error of the side's technique. Empty: there are none.
+  std::string differences_from_reference(const Side& side) const {
+    const auto own = exact(side.technique.side.settings), made = exact(reference->side.settings);
+    std::string text;
+    for (std::size_t i = 0; i < own.size(); ++i)
+      if (const Setting& setting = declared.all()[i]; own[i] != made[i] && setting.effect != Effect::none)
+        text += (text.empty() ? "" : ", ") + setting.in_words(made[i]);
+    return text;
+  }
+
+  /// Says why the reference that is wanted is not being made; empty if it is.
+  void post_why_no_reference(const std::string& why) {
+    {
+      const std::lock_guard lock(board->mutex);
+      if (std::exchange(board->activity.reference_failure, why) == why) return;
+    }
+    board->say_changed();
+  }
+
   /// Does the next piece of work on the reference; false if there is none.
   bool work_on_reference() {
     check_reference();
     const Wanted& wanted = now.wanted;
     const Side& a = *sides[0];
-    if (wanted.reference_samples <= 0 || !a.failure.empty() || !a.technique.built) return false;
-    if (a.technique.demo->display().heatmap) return false;
+    if (wanted.reference_samples <= 0) return post_why_no_reference(""), false;
+    if (reference && (reference->complete || !reference->failure.empty())) return false;
+    const bool built = a.failure.empty() && a.technique.built;
+    const std::string why_not = !built                                ? "there is none while A has no picture"
+                                : a.technique.demo->display().heatmap ? "a heat map has none: it counts"
+                                                                      : "";
+    post_why_no_reference(why_not);
+    if (!why_not.empty()) return false;
     if (!reference) begin_reference(std::make_unique<Technique>());
-    if (reference->complete || !reference->failure.empty()) return false;
     const int half = (wanted.reference_samples + 1) / 2;
     say("reference", double(reference->samples()) / (2 * half), false);
     try {
@@ -1430,23 +1482,6 @@ struct RenderThread::State {
 
   // ---- requests ---------------------------------------------------------------------
 
-  /// Drops what was asked of pictures that are no more wanted.
-  void drop_requests(const std::vector<Effect>& effects) {
-    std::deque<std::shared_ptr<const Request>> dropped;  // after the lock is open again
-    const std::lock_guard lock(inbox);
-    for (std::size_t k = 0; k < requests.size();) {
-      const Request& one = *requests[k];
-      const auto side = static_cast<std::size_t>(one.side);
-      if (one.kind == Request::Kind::inspect && one.generation < now.generation &&
-          (side >= effects.size() || effects[side] >= Effect::restart)) {
-        dropped.push_back(requests[k]);
-        requests.erase(requests.begin() + static_cast<std::ptrdiff_t>(k));
-      } else {
-        ++k;
-      }
-    }
-  }
-
   /// Answers what can be answered. `during`: the job between whose bands this is, or null.
   void serve_requests(Job* during) {
     for (std::size_t k = 0;;) {
@@ -1473,18 +1508,23 @@ struct RenderThread::State {
       answer_image(one, side);
       return true;
     }
-    if (!side || !side->failure.empty()) return true;
-    if (!side->technique.built) return false;
+    const std::string why_not = !side                      ? "there is no such side"
+                                : !side->failure.empty()   ? side->failure
+                                : side->technique.built    ? ""
+                                : !during && now.on_hold() ? "it is paused, and was not built before"
+                                                           : "not yet";
+    if (why_not == "not yet") return false;
     if (one.kind == Request::Kind::savings) {
+      if (!why_not.empty()) return true;
       if (during || side->full.samples == 0) return false;
       measure_savings(static_cast<std::size_t>(one.side));
       return true;
     }
-    Inspection inspection;
+    Inspection inspection{{{"not known", why_not}}, {}, {}};
+    if (!why_not.empty()) return one.inspected(inspection), true;
     bool done = true;
-    const Wanted& wanted = now.wanted;
     const auto work = [&] {
-      inspection = side->technique.demo->inspect(wanted.camera, wanted.width, wanted.height, one.x, one.y);
+      inspection = side->technique.demo->inspect(one.camera, one.width, one.height, one.x, one.y);
     };
     try {
       if (during) {
@@ -1593,16 +1633,17 @@ std::vector<Line> RenderThread::overlay() const {
   return state_->board->overlay;
 }
 
-void RenderThread::inspect(int side, int x, int y, std::function<void(const Inspection&)> done) {
-  state_->request({State::Request::Kind::inspect, side, x, y, std::move(done), {}, 0});
+void RenderThread::inspect(int side, const Camera& camera, int width, int height, int x, int y,
+                           std::function<void(const Inspection&)> done) {
+  state_->request({State::Request::Kind::inspect, side, camera, width, height, x, y, std::move(done), {}, 0});
 }
 
 void RenderThread::image(int side, std::function<void(const Image&, int, const std::string&)> done) {
-  state_->request({State::Request::Kind::image, side, 0, 0, {}, std::move(done), 0});
+  state_->request({State::Request::Kind::image, side, {}, 0, 0, 0, 0, {}, std::move(done), 0});
 }
 
 void RenderThread::measure_omissions(int side) {
-  state_->request({State::Request::Kind::savings, side, 0, 0, {}, {}, 0});
+  state_->request({State::Request::Kind::savings, side, {}, 0, 0, 0, 0, {}, {}, 0});
 }
 
 }  // namespace trilha

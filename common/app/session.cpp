@@ -190,6 +190,7 @@ Session::Session(std::function<std::unique_ptr<Demo>()> make_demo, const Options
   std::tie(chapter_, title_) = sides_[0].demo->name();
   if (options.samples) samples_ = *options.samples;
   width_ = options.width, height_ = options.height;
+  reference_samples_ = options.reference;
   if (!options.split.empty()) {
     take(read_flags(options.split), 1);
     split_ = was_split_ = true;
@@ -215,8 +216,14 @@ void Session::update() {
   }
   Wanted wish = this->wish();
   if (generation_ != 0 && equal(wish, wanted_)) return;
-  wanted_ = std::move(wish);
+  std::swap(wanted_, wish);
   generation_ = renderer_->want(wanted_);
+  const bool other_view = wish.scene != wanted_.scene || !equal(wish.camera, wanted_.camera) ||
+                          wish.width != wanted_.width || wish.height != wanted_.height ||
+                          wish.seed != wanted_.seed || wish.jittered != wanted_.jittered;
+  for (std::size_t i = 0; i < wanted_.sides.size(); ++i)
+    if (other_view || i >= wish.sides.size() || wish.sides[i] != wanted_.sides[i])
+      look_generations_[i] = generation_;
 }
 
 Wanted Session::wish() const {

@@ -56,6 +56,8 @@ class Session {
   /// The wish that the renderer was told last.
   const Wanted& wanted() const { return wanted_; }
   std::uint64_t generation() const { return generation_; }
+  /// The newest wish that asked for other pixels of that side than the one before: what is older shows them.
+  std::uint64_t look_generation(int side) const { return look_generations_[static_cast<std::size_t>(side)]; }
 
   // ---- what the panel changes; update() does what is necessary ----
 
@@ -216,6 +218,7 @@ class Session {
 
   Wanted wanted_;
   std::uint64_t generation_ = 0;
+  std::array<std::uint64_t, 2> look_generations_{};
   std::unique_ptr<RenderThread> renderer_;  ///< last: it ends first, with all that calls back from it
 };
 

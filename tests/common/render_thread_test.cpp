@@ -910,7 +910,7 @@ TEST_CASE("a pixel is inspected soon, also within a long sample") {
     std::mutex mutex;
     Inspection inspection;
     const auto asked = Clock::now();
-    told.thread.inspect(0, k, 9, [&](const Inspection& what) {
+    told.thread.inspect(0, wanted.camera, wanted.width, wanted.height, k, 9, [&](const Inspection& what) {
       const std::lock_guard lock(mutex);
       inspection = what;
       done = true;
