@@ -1377,7 +1377,7 @@ struct RenderThread::State {
     if (reference && (reference->complete || !reference->failure.empty())) return false;
     const bool built = a.failure.empty() && a.technique.built;
     const std::string why_not = !built                                ? "there is none while A has no picture"
-                                : a.technique.demo->display().heatmap ? "a heat map has none: it counts"
+                                : a.technique.demo->display().heatmap ? "of a heat map there is none"
                                                                       : "";
     post_why_no_reference(why_not);
     if (!why_not.empty()) return false;
@@ -1508,12 +1508,12 @@ struct RenderThread::State {
       answer_image(one, side);
       return true;
     }
-    const std::string why_not = !side                      ? "there is no such side"
-                                : !side->failure.empty()   ? side->failure
-                                : side->technique.built    ? ""
-                                : !during && now.on_hold() ? "it is paused, and was not built before"
-                                                           : "not yet";
-    if (why_not == "not yet") return false;
+    const bool tries = side && (side->failure.empty() ? !side->technique.built : side->retry);
+    if (tries && (during || !now.on_hold())) return false;
+    const std::string why_not = !side                    ? "there is no such side"
+                                : !side->failure.empty() ? side->failure
+                                : tries                  ? "it is paused, and was not built before"
+                                                         : "";
     if (one.kind == Request::Kind::savings) {
       if (!why_not.empty()) return true;
       if (during || side->full.samples == 0) return false;
