@@ -188,6 +188,9 @@ TEST_CASE("without the panel, what acts on a side acts on one that is there") {
   sheet.key('S');
   sheet.session().set(1, "count", "70");
   sheet.key(keys::tab);
+  sheet.key('C');
+  CHECK(std::string(ImGui::GetClipboardText()) == sheet.session().command(1));
+  CHECK(sheet.session().command(1) != sheet.session().command(0));
   sheet.key('P');
   sheet.key('S');
   ImGui::SetClipboardText("");
