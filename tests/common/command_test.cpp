@@ -272,6 +272,7 @@ TEST_CASE("headless is what was said, and what only a file can answer") {
   };
   CHECK_FALSE(headless({}));
   CHECK_FALSE(headless({"--samples", "4", "--size", "64x48", "--quiet"}));
+  CHECK_FALSE(headless({"--reference", "64"}));
   CHECK_FALSE(headless({"--split", "b.ini", "--fullscreen"}));
   CHECK_FALSE(headless({"--screenshot", "a.png", "--window-size", "640x480", "--scale", "2"}));
   CHECK(headless({"--headless"}));
