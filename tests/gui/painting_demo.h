@@ -42,7 +42,8 @@ class PaintingDemo : public FakeDemo {
     const float grey = static_cast<float>(count) / 100 + 0.05f * random.uniform() +
                        (fruit == Fruit::apple ? 0.1f : 0) + (ripe ? 0.02f : 0);
     const std::size_t n = std::size_t{film.tiling().width} * film.tiling().height;
-    for (std::size_t i = 0; i < n; ++i) film.pixels()[i] = film.pixels()[i] + vec4(vec3(grey), 1);
+    float* sums = &film.pixels()->x;
+    for (std::size_t i = 0; i < 4 * n; ++i) sums[i] += i % 4 == 3 ? 1 : grey;
     rays_ += static_cast<double>(n);
     return request.keep_going(1);
   }
