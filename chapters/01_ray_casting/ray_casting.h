@@ -5,6 +5,7 @@
 // and triangle_tiles are the same loop in the order that a CPU's vectors and a GPU's shared memory want.
 
 #include <functional>
+#include <type_traits>
 
 #include "chapters/01_ray_casting/ray_triangle.h"
 #include "common/image/film.h"
@@ -227,6 +228,26 @@ struct Trace {
   }
 };
 
+/// Ray → 1 if anything is hit within its interval, else 0, by any structure.
+template <class Structure>
+struct Occlude {
+  using T = typename Structure::Scalar;
+  Structure structure;
+  std::size_t first;
+  const RayOf<T>* rays;
+  std::uint8_t* occluded;
+
+  TRILHA_HD void operator()(std::size_t i) const {
+    NoProbe probe;
+    occluded[i - first] = structure.occluded(rays[i - first], probe) ? 1 : 0;
+  }
+};
+
+/// What is asked of a ray, and the answer's type: its nearest hit; or whether there is any, 1 or 0.
+enum class Query { closest, occluded };
+template <Query query, class T>
+using QueryAnswer = std::conditional_t<query == Query::closest, HitOf<T>, std::uint8_t>;
+
 /// What the test keeps of `count` triangles, in the order that the loop wants on the stream's backend, where
 /// all arrays lie.
 template <class Test, class T>
@@ -237,6 +258,13 @@ Buffer<T> prepare_triangles(const Stream& stream, Loop loop, const vec3* positio
 template <class Test, class T>
 void trace_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles,
                      const RayOf<T>* rays, HitOf<T>* hits, std::size_t n);
+
+/// Is there any hit with t in [ray.t_min, ray.t_max)? 1 or 0 for each of n rays: in every loop what the
+/// nearest hit's found() is, but a ray is done with its first hit, whichever triangle that is. For shadow
+/// rays.
+template <class Test, class T>
+void occluded_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles,
+                        const RayOf<T>* rays, std::uint8_t* occluded, std::size_t n);
 
 /// What shading reads of the surface. Null is what the chosen mode does not need.
 struct SurfaceView {
