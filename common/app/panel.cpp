@@ -223,6 +223,10 @@ void Interface::settings_of(int side) {
         ImGui::SetTooltip(
             "--samples: one goes through the pixel's centre, more go anywhere in it.\n"
             "Ctrl-click to type.");
+      if (const auto complete = own.demo->samples())
+        ImGui::TextDisabled("%s", (counted(static_cast<std::uint64_t>(*complete), "sample") +
+                                   (*complete == 1 ? " completes" : " complete") + " the picture")
+                                      .c_str());
       ImGui::EndTable();
     }
     std::string group;

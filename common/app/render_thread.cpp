@@ -61,6 +61,11 @@ bool swapped(const Wanted& from, const Wanted& to) {
          from.sides[0] == to.sides[1] && from.sides[1] == to.sides[0];
 }
 
+/// The samples a pixel that are wanted of a side at the end.
+int samples_of(const Wanted& wanted, const Wanted::Side& side) {
+  return side.most_samples > 0 ? std::min(wanted.samples, side.most_samples) : wanted.samples;
+}
+
 /// 1, 2, 3, 4, 6, 8, 11, 16, …: the numbers of samples at which errors are measured, a factor √2 apart.
 bool is_curve_point(int samples) {
   const double k = std::round(2 * std::log2(samples));
@@ -134,6 +139,7 @@ struct Side {
   double publish_ms = 0;
 
   std::ptrdiff_t structure_bytes = 0, working_bytes = 0, own_bytes = 0;
+  std::vector<std::string> remarks;
   std::vector<Saving> left_out;
 
   Side() = default;
@@ -385,7 +391,8 @@ struct RenderThread::State {
     const Wanted::Side &before = from.sides[i], &after = to.sides[j];
     if (before.backend != after.backend) return Effect::rebuild;
     const Effect effect = declared.difference(before.settings, after.settings);
-    const bool restart = !same_view(from, to) || from.seed != to.seed || from.jittered != to.jittered;
+    const bool restart = !same_view(from, to) || from.seed != to.seed ||
+                         (from.jittered && !before.centred) != (to.jittered && !after.centred);
     return restart ? std::max(effect, Effect::restart) : effect;
   }
 
@@ -407,7 +414,8 @@ struct RenderThread::State {
       case Job::Kind::build:
         return effect_on(own, from, to) == Effect::rebuild;
       case Job::Kind::render:
-        return restarts(own) || job.samples > to.samples || (job.interruptible && another);
+        return restarts(own) || job.samples > samples_of(to, to.sides[swapped(from, to) ? 1 - own : own]) ||
+               (job.interruptible && another);
       case Job::Kind::compare:
         return another;
       default:
@@ -606,7 +614,7 @@ struct RenderThread::State {
         other_looks = true;
         side.look = ++numbers;
         restart(side, true);
-      } else if (side.full.samples > to.samples) {
+      } else if (side.full.samples > samples_of(to, to.sides[i])) {
         restart(side, false);
         side.frame_look = 0;  // what it shows goes on being shown, but is not what is wanted
       }
@@ -629,6 +637,7 @@ struct RenderThread::State {
   /// something else.
   void restart(Side& side, bool coarsely) {
     side.run = ++numbers;
+    side.remarks.clear();
     side.full.begun = false;
     side.full.samples = 0;
     side.coarsely = coarsely;
@@ -676,7 +685,7 @@ struct RenderThread::State {
       if (is_well(*sides[i]) && is_out_of_date(*sides[i])) return publish_again(i), Next{true};
     if (work_on_reference()) return {true};
     for (std::size_t i = 0; i < sides.size(); ++i)
-      if (is_well(*sides[i]) && sides[i]->full.samples < wanted.samples &&
+      if (is_well(*sides[i]) && sides[i]->full.samples < wanted_of(*sides[i]) &&
           (!next || sides[i]->full.samples < sides[*next]->full.samples))
         next = i;
     if (compare_if_due()) return {true};
@@ -694,7 +703,7 @@ struct RenderThread::State {
     for (const auto& side : sides)
       metered(*side, [&] {
         side->frames->trim(1);
-        if (side->full.samples >= now.wanted.samples) side->full.backup.reset();
+        if (side->full.samples >= wanted_of(*side)) side->full.backup.reset();
       });
   }
 
@@ -751,6 +760,9 @@ struct RenderThread::State {
   }
 
   // ---- a side ------------------------------------------------------------------
+
+  /// The samples a pixel that it has at the end.
+  int wanted_of(const Side& side) const { return samples_of(now.wanted, side.technique.side); }
 
   std::string called(std::size_t i) const { return sides.size() < 2 ? "" : i == 0 ? " A" : " B"; }
 
@@ -934,7 +946,7 @@ struct RenderThread::State {
         metered(side, [&] { make_ready(side.full, *side.technique.stream, back_up); });
         begun = true;
         finished = render_sample(side, job, *side.full.film, static_cast<std::uint32_t>(side.full.samples),
-                                 now.wanted.jittered, ms, between);
+                                 now.wanted.jittered && !side.technique.side.centred, ms, between);
       });
       if (!done || !finished) {
         if (begun && back_up)
@@ -949,12 +961,13 @@ struct RenderThread::State {
       side.render_ms += ms;
       side.sample_ms = ms;
       side.rays += side.technique.demo->rays() - rays;
+      side.remarks = side.technique.demo->remarks();
       add_stages(side, stages);
       side.ms_per_pixel = ms / pixels;
       side.unpublished = true;
       post_figures(i);
       const double since = milliseconds(side.published_at);
-      if (side.full.samples >= now.wanted.samples || ms > frame_ms ||
+      if (side.full.samples >= wanted_of(side) || ms > frame_ms ||
           since > std::max(frame_ms, frame_share * side.publish_ms))
         publish_again(i);
       measure_sample(i);
@@ -973,7 +986,7 @@ struct RenderThread::State {
 
   double progress(double fraction) const {
     double done = fraction, all = 0;
-    for (const auto& side : sides) done += side->full.samples, all += now.wanted.samples;
+    for (const auto& side : sides) done += side->full.samples, all += wanted_of(*side);
     return std::min(1.0, done / std::max(all, 1.0));
   }
 
@@ -1002,7 +1015,7 @@ struct RenderThread::State {
     frame->generation = now.generation;
     frame->samples = samples;
     frame->shrink = shrink;
-    frame->complete = samples >= now.wanted.samples;
+    frame->complete = samples >= wanted_of(side);
     frame->side = side.technique.side;
     frame->display = side.technique.demo->display();
     frame->camera = now.wanted.camera;
@@ -1035,7 +1048,7 @@ struct RenderThread::State {
   bool is_out_of_date(const Side& side) const {
     if (!side.frame || side.frame_look != side.look || side.full.samples == 0) return false;
     return side.frame->side != side.technique.side ||
-           side.frame->complete != (side.frame->samples >= now.wanted.samples);
+           side.frame->complete != (side.frame->samples >= wanted_of(side));
   }
 
   /// The picture, once every side has a frame of this view.
@@ -1075,6 +1088,7 @@ struct RenderThread::State {
                        {"structure", size(side.structure_bytes)},
                        {"rays and hits", size(side.working_bytes)},
                        {"films and frames", size(side.own_bytes)}};
+    figures.remarks = side.remarks;
     figures.left_out = side.left_out;
     figures.overlay_levels = side.overlay_levels;
     figures.failure = side.failure;
@@ -1149,7 +1163,7 @@ struct RenderThread::State {
   void measure_sample(std::size_t i) {
     Side& side = *sides[i];
     const int samples = side.full.samples;
-    if (!is_curve_point(samples) && samples < now.wanted.samples) return;
+    if (!is_curve_point(samples) && samples < wanted_of(side)) return;
     const Display display = side.technique.demo->display();
     const bool tells_error = reference && reference->complete && !display.heatmap;
     if (!display.heatmap && !tells_error) return;
@@ -1192,9 +1206,13 @@ struct RenderThread::State {
   bool compare_if_due() {
     if (!now.wanted.difference || sides.size() != 2) return false;
     Side &a = *sides[0], &b = *sides[1];
-    const int samples = std::min(a.full.samples, b.full.samples);
-    if (!a.failure.empty() || !b.failure.empty() || samples == 0) return false;
-    const bool complete = samples >= now.wanted.samples;
+    if (!a.failure.empty() || !b.failure.empty() || a.full.samples == 0 || b.full.samples == 0) return false;
+    // one that is complete waits for the other
+    const bool a_complete = a.full.samples >= wanted_of(a), b_complete = b.full.samples >= wanted_of(b);
+    const bool complete = a_complete && b_complete;
+    const int samples = a_complete   ? b.full.samples
+                        : b_complete ? a.full.samples
+                                     : std::min(a.full.samples, b.full.samples);
     const Compared next{comparable, samples, complete};
     if (next == compared) return false;
     if (!is_curve_point(samples) && !complete && compared.comparable == comparable) return false;
@@ -1220,7 +1238,7 @@ struct RenderThread::State {
     comparison.generation = now.generation;
     constexpr int key = 2;
     const auto compare = [this, film_a = films[0], film_b = films[1], display_a = displays[0],
-                          display_b = displays[1], comparison, of = comparable]() mutable {
+                          display_b = displays[1], comparison, complete, of = comparable]() mutable {
       const auto image_a = std::make_shared<const Image>(developed(*film_a, display_a, Backend::cpu));
       const auto image_b = std::make_shared<const Image>(developed(*film_b, display_b, Backend::cpu));
       comparison.measures = {{"rmse", rmse(*image_a, *image_b).value},
@@ -1230,7 +1248,7 @@ struct RenderThread::State {
       comparison.image = std::make_shared<const Image>(std::move(difference.image));
       comparison.scale = difference.scale;
       show(board, comparison, of);
-      if (comparison.samples[0] != comparison.samples[1]) return;
+      if (comparison.samples[0] != comparison.samples[1] && !complete) return;
       measuring_slowly->post(key, 1, [board = board, image_a, image_b, comparison, of]() mutable {
         comparison.measures.emplace_back("ssim", ssim(*image_a, *image_b));
         show(board, comparison, of);
@@ -1330,7 +1348,7 @@ struct RenderThread::State {
     if (a.technique.demo->display().heatmap) return false;
     if (!reference) begin_reference(std::make_unique<Technique>());
     if (reference->complete || !reference->failure.empty()) return false;
-    const int half = (wanted.reference_samples + 1) / 2;
+    const int half = half_of_reference(wanted);
     say("reference", double(reference->samples()) / (2 * half), false);
     try {
       if (!reference->technique->built)
@@ -1350,6 +1368,13 @@ struct RenderThread::State {
       board->say_changed();
     }
     return true;
+  }
+
+  /// The samples of each half: no more than complete the picture, where the exact settings do that.
+  int half_of_reference(const Wanted& wanted) const {
+    const int half = (wanted.reference_samples + 1) / 2;
+    const Technique* technique = reference->technique.get();
+    return technique && technique->built ? std::min(half, technique->demo->samples().value_or(half)) : half;
   }
 
   void build_reference() {
@@ -1374,8 +1399,8 @@ struct RenderThread::State {
       begun = true;
       const Camera camera = now.wanted.camera;
       finished = technique.demo->add_sample(
-          *half.film, {camera, static_cast<std::uint32_t>(half.samples), true, reference->seeds[which],
-                       band_ms, [&](double) { return go_on(job); }});
+          *half.film, {camera, static_cast<std::uint32_t>(half.samples), technique.demo->samples() != 1,
+                       reference->seeds[which], band_ms, [&](double) { return go_on(job); }});
       technique.stream->synchronize();
     });
     if (done && finished) {

@@ -21,6 +21,9 @@ struct Wanted {
   struct Side {
     Backend backend = Backend::cpu;
     std::vector<std::string> settings;  ///< Settings::texts()
+    /// So many samples complete its picture, of `samples` that may be more; 0: there is no such number.
+    int most_samples = 0;
+    bool centred = false;  ///< its samples go through the pixel's centre, jittered or not
     bool operator==(const Side&) const = default;
   };
 
@@ -29,7 +32,7 @@ struct Wanted {
   Camera camera;
   int width = 0,
       height = 0;         ///< of the image, in pixels; 0: nothing is seen (minimised), and nothing is done
-  int samples = 1;        ///< a pixel, at the end
+  int samples = 1;        ///< a pixel, at the end, but for sides that are complete before
   bool jittered = false;  ///< as SampleRequest has it
   std::uint64_t seed = 0;
 
@@ -53,7 +56,7 @@ struct Frame {
   std::uint64_t generation = 0;  ///< of the newest wish that it was known to fulfil when it was made
   int samples = 0;               ///< complete ones
   int shrink = 1;                ///< pixels of the image to one rendered pixel, a side, where it is coarsest
-  bool complete = false;         ///< all samples that were wanted
+  bool complete = false;         ///< all samples that were wanted of its side
   Wanted::Side side;             ///< the settings that made it
   Display display;
   Camera camera;
@@ -87,7 +90,8 @@ struct Figures {
   /// By kind: "scene" (on the host), "structure", "rays and hits", "films and frames"; all but the first by
   /// Buffer's counter.
   std::vector<std::pair<std::string, std::size_t>> bytes;
-  std::vector<Saving> left_out;    ///< without the functions; measured when measure_omissions asked for it
+  std::vector<std::string> remarks;  ///< Demo::remarks after the last complete sample
+  std::vector<Saving> left_out;      ///< without the functions; measured when measure_omissions asked for it
   std::vector<ErrorPoint> errors;  ///< at 1, 2, 3, 4, 6, 8, 11, 16, … (√2 times as many) and all samples
   int overlay_levels = 0;          ///< of the structure that was built: what Wanted::overlay_level may be
   /// Of a heat map: how many pixels lie in each of 64 equal bins from 0 to `most` (1 where that is 0).
@@ -99,7 +103,7 @@ struct Figures {
 struct Comparison {
   std::array<int, 2> samples{};  ///< of A and of B
   std::uint64_t generation = 0;
-  /// rmse, psnr, max_error; soon after, and where both have as many samples, ssim and flip.
+  /// rmse, psnr, max_error; soon after, and where both have as many samples or all of theirs, ssim and flip.
   std::vector<std::pair<std::string, double>> measures;
   std::shared_ptr<const Image> image;  ///< difference_image: display values
   double scale = 0;                    ///< the difference that is yellow in it

@@ -76,6 +76,7 @@ class Session {
   std::string why_not(Backend backend) const { return why_unavailable(backend); }
 
   void set_size(int width, int height);  ///< of the image, in pixels; 0, 0: nothing is seen
+  /// The most that a side gets; one whose settings complete its picture by fewer gets these.
   void set_samples(int samples);
   int samples() const { return samples_; }
   void pause(bool on) { paused_ = on; }
@@ -176,6 +177,9 @@ class Session {
   void ask(Request request);
   void load_next();
   void take_loaded();
+  std::string default_scene() const;
+  void warn(const std::vector<std::string>& warnings);
+  void tell_remarks();
   void show(const Request& request, std::shared_ptr<const Scene> scene);
   LoadOptions needed() const;
   double aspect() const;
@@ -216,6 +220,7 @@ class Session {
 
   Wanted wanted_;
   std::uint64_t generation_ = 0;
+  std::array<std::vector<std::string>, 2> remarks_;  ///< of each side, as they were told last
   std::unique_ptr<RenderThread> renderer_;  ///< last: it ends first, with all that calls back from it
 };
 

@@ -246,8 +246,9 @@ Film headless(const MakeDemo& make, const Wanted& wanted, const Wanted::Side& si
   demo->build(*wanted.scene, side.backend);
   Film film(side.backend, width, height);
   for (int k = 0; k < std::max(samples, 1); ++k)
-    demo->add_sample(film, {wanted.camera, static_cast<std::uint32_t>(k), samples > 0 && wanted.jittered,
-                            wanted.seed, 1e9, [](double) { return true; }});
+    demo->add_sample(
+        film, {wanted.camera, static_cast<std::uint32_t>(k), samples > 0 && wanted.jittered && !side.centred,
+               wanted.seed, 1e9, [](double) { return true; }});
   if (display) *display = demo->display();
   return film;
 }
@@ -715,6 +716,48 @@ TEST_CASE("more samples go on from those that are there, fewer begin again") {
     CHECK(told.fault_of_picture() == "");
     if (samples == 9) CHECK(told.thread.figures(0).render_ms > before);
   }
+}
+
+// Catches: a side that gets more samples than complete it, fewer, or those of the other; one that is never
+// done, or not compared; an only sample that is jittered.
+TEST_CASE("sides are complete with samples of their own") {
+  Workshop workshop;
+  Told told(fakes(workshop));
+  Wanted wanted = wish({side_of(told.make, {{"tint", "2"}}), side_of(told.make)}, 12);
+  const auto check = [&](int a, int b) {
+    const std::uint64_t generation = told.finish(wanted);
+    INFO(a << " and " << b);
+    REQUIRE(within(20, [&] { return told.thread.activity().what == "done"; }));
+    CHECK(told.thread.picture().generation == generation);
+    CHECK(told.thread.picture().sides[0]->samples == a);
+    CHECK(told.thread.picture().sides[1]->samples == b);
+    CHECK(told.fault_of_picture() == "");
+  };
+  wanted.sides[0].most_samples = 5;
+  check(5, 12);
+  wanted.sides[0].most_samples = 7;  // goes on
+  const double ms = told.thread.figures(0).render_ms;
+  check(7, 12);
+  CHECK(told.thread.figures(0).render_ms > ms);
+  wanted.sides[0].most_samples = 2;  // begins again
+  check(2, 12);
+  wanted.sides[1].most_samples = 40;  // more than are wanted
+  check(2, 12);
+  std::swap(wanted.sides[0], wanted.sides[1]);
+  check(12, 2);
+  wanted.sides[1].most_samples = 1;
+  wanted.sides[1].centred = true;
+  check(12, 1);
+  const auto centred = told.thread.picture().sides[1]->pixels.to_vector(Backend::cpu);
+  wanted.sides[1].centred = false;
+  check(12, 1);
+  CHECK(told.thread.picture().sides[1]->pixels.to_vector(Backend::cpu) != centred);
+  wanted.difference = true;
+  check(12, 1);
+  CHECK(within(20, [&] {
+    const auto comparison = told.thread.comparison();
+    return comparison && comparison->samples == std::array<int, 2>{12, 1} && comparison->measures.size() == 5;
+  }));
 }
 
 // Catches: settings of no effect that cost a build or samples, or that a frame does not name.
