@@ -192,6 +192,10 @@ TEST_CASE("Fresnel's shares are those of the closed forms") {
       if (c > 0 && eta != 1 && !(std::fabs(exact + T - 1) <= 16 * u * (1 + eta * eta / k)))
         FAIL_CHECK("R + T = " << double(exact + T) << ", cosine " << c);
       worst = std::max(worst, double(std::fabs(exact - R) / (u * (1 + eta * eta / k))));
+      const L r0 = (1 - L(eta)) * (1 - L(eta)) / ((1 + L(eta)) * (1 + L(eta)));
+      const L x = 1 - (eta > 1 ? ct : L(c)), polynomial = r0 + (1 - r0) * x * x * x * x * x;
+      if (!(std::fabs(schlick - polynomial) <= 16 * u * (1 + eta * eta / k)))
+        FAIL_CHECK("Schlick, cosine " << c << ": " << schlick);
       // backwards the same share; 1/eta is rounded, and what counts of it is its difference from one
       const float back = fresnel_exact(float(ct), c, 1 / eta), there = fresnel_exact(c, float(ct), eta);
       if (!(std::fabs(back - there) <= 32 * u + 4 * u * there / std::max(std::fabs(1 - eta), FLT_MIN)))
@@ -237,10 +241,12 @@ struct SphereCase {
   RayOf<double> ray;  // all its numbers are floats
 };
 
-constexpr int sphere_kinds = 8;
-const char* const sphere_kind[sphere_kinds] = {
-    "from some radii away",   "from inside",         "on the surface",     "grazing", "1e5 radii away",
-    "1e±18, any length of d", "at 1e5 radii from 0", "radius 1e6, near by"};
+constexpr int sphere_kinds = 9;
+const char* const sphere_kind[sphere_kinds] = {"from some radii away",   "from inside",
+                                               "on the surface",         "grazing",
+                                               "1e5 radii away",         "1e±18, any length of d",
+                                               "at 1e5 radii from 0",    "radius 1e6, near by",
+                                               "grazing, 1e5 radii away"};
 
 SphereCase sphere_case(Random& random, int kind) {
   SphereCase c;
@@ -248,7 +254,7 @@ SphereCase sphere_case(Random& random, int kind) {
   dvec3 centre = random_unit(random) * double(random.uniform(0, 4)) * r;
   if (kind == 1) distance = random.uniform() * r;
   if (kind == 2) distance = r;
-  if (kind == 4) distance = r * random_size(random, 3, 5);
+  if (kind == 4 || kind == 8) distance = r * random_size(random, 3, 5);
   if (kind == 5) {
     r = random_size(random, -18, 18);
     centre = random_unit(random) * r * 3.0;
@@ -263,11 +269,12 @@ SphereCase sphere_case(Random& random, int kind) {
   const dvec3 out =
       kind == 7 ? glm::normalize(dvec3(0, 1, 0) + 1e-5 * random_unit(random)) : random_unit(random);
   const dvec3 origin = rounded(rounded(centre) + distance * out);
-  if (kind == 3) aside = 1 + (random.uniform_double() - 0.5) * random_size(random, -8, 0);
+  if (kind == 3 || kind == 8) aside = 1 + (random.uniform_double() - 0.5) * random_size(random, -8, 0);
   dvec3 d = random_unit(random);
   if (kind != 1 && kind != 2 && kind != 7) {  // aimed at a point beside the centre
     const dvec3 target =
-        rounded(centre) + across(random, out) * (r * aside * (kind == 3 ? 1 : random.uniform_double()));
+        rounded(centre) +
+        across(random, out) * (r * aside * (kind == 3 || kind == 8 ? 1 : random.uniform_double()));
     d = glm::normalize(target - origin);
   }
   c.ray.origin = origin;
@@ -421,6 +428,31 @@ TEST_CASE("a sphere's ends: tangents, starts on it, t_min and t_max, ties, radiu
   CHECK(box.upper.z < 1.00001f);
 }
 
+// Catches: c = |from|² − r² with cancellation, which calls an origin just outside inside: the ray that leaves
+// meets the sphere at once.
+TEST_CASE("of an origin next to a sphere, the side is told to the last bit") {
+  int outside = 0, inside = 0, wrong = 0;
+  for (std::size_t i = 0; i < 40000; ++i) {
+    Random random(15, i);
+    const double r = random_size(random, -3, 3);
+    const Sphere sphere{vec3(rounded(random_unit(random) * r)), float(r), 0};
+    const dvec3 n = random_unit(random);
+    Ray ray;
+    ray.origin = vec3(dvec3(sphere.centre) + n * double(sphere.radius));
+    ray.direction = vec3(random_unit(random));
+    const lvec3 f = lvec3(ray.origin) - lvec3(sphere.centre);
+    const L c = dot(f, f) - L(sphere.radius) * sphere.radius, fd = dot(f, lvec3(ray.direction));
+    if (std::fabs(c) < 0x1p-44L * r * r || fd < 4 * u * r) continue;
+    Hit hit;
+    Spheres<float>{&sphere, 1, 0}.intersect(0, ray, hit);
+    (c > 0 ? outside : inside) += 1;
+    wrong += hit.found() != (c < 0);
+  }
+  CHECK(outside > 3000);
+  CHECK(inside > 3000);
+  CHECK(wrong == 0);
+}
+
 // ---- planes ------------------------------------------------------------------
 
 // Catches: n·o − offset with cancellation, signs, parallel rays that hit, planes whose normal is not unit.
@@ -520,7 +552,8 @@ struct Placed {
 
 /// A point on a surface of that kind; false where the made ray misses.
 bool place(Random& random, Surface::Kind kind, double size, double away, double aspect, Placed& out) {
-  const dvec3 middle = random_unit(random) * size * away;
+  dvec3 middle = random_unit(random) * size * away;
+  if (random.index(3) == 0) middle = dvec3(0, away * size, 0);  // one coordinate worse than the others
   out.size = size;
   out.surface.kind = kind;
   Ray ray;

@@ -82,17 +82,22 @@ TRILHA_HD inline Vec3<T> along(const RayOf<T>& ray, T t, const Vec3<T>& origin) 
           fma(t, ray.direction.z, origin.z)};
 }
 
+/// What rounding to a coordinate p can be off by, over |p|: u, and some of its own roundings.
+template <class T>
+constexpr T of_coordinate = unit_roundoff<T>*(1 + 8 * unit_roundoff<T>);
+
 // ---- the three surfaces ------------------------------------------------------
 
 /// The point of a sphere where a ray hits it at t; the normal points outwards. v, from the centre to
 /// origin + t·direction, is rounded, but whatever it is, centre + radius·v/|v| lies on the sphere. Of that,
 /// v/|v| is right up to γ₄, and the fma that adds the centre rounds once:
 ///     error = γ₄·radius·|nᵢ| + u|pᵢ|,
-/// and what underflow loses. Moved inwards, a point that is off sideways by e is e²/2r nearer to the sphere:
-/// e²/r along the normal is added.
+/// and what underflow loses. Moved inwards, a point that is off sideways by w is w²/2r nearer to the sphere.
+/// In each component that is this error, and three times as much by the rounding away in offsets.h: w² <=
+/// 48e², e the largest; 24e²/r along the normal is added.
 template <class T>
 TRILHA_HD inline SurfacePointOf<T> sphere_point(const Sphere& sphere, const RayOf<T>& ray, T t) {
-  constexpr T u = unit_roundoff<T>, four = static_cast<T>(gamma<T>(5));  // γ₅: n is the rounded one
+  constexpr T four = static_cast<T>(gamma<T>(5));  // γ₅: n is the rounded one
   constexpr T lost = std::numeric_limits<T>::denorm_min();
   const Vec3<T> centre(sphere.centre);
   const T r = sphere.radius;
@@ -101,32 +106,28 @@ TRILHA_HD inline SurfacePointOf<T> sphere_point(const Sphere& sphere, const RayO
   if (s.normal == Vec3<T>(0)) s.normal = unit(-ray.direction);  // so far away that v has no digits left
   for (int i = 0; i < 3; ++i) {
     s.point[i] = fma(r, s.normal[i], centre[i]);
-    s.error[i] = fma(four * r, std::fabs(s.normal[i]), fma(2 * u, std::fabs(s.point[i]), (2 + r) * lost));
+    s.error[i] =
+        fma(four * r, std::fabs(s.normal[i]), fma(of_coordinate<T>, std::fabs(s.point[i]), (2 + r) * lost));
   }
-  const T most = largest(s.error), curvature = 3 * most * (most / r);
+  const T most = largest(s.error), curvature = 24 * most * (most / r);
   for (int i = 0; i < 3; ++i) s.error[i] = fma(curvature, std::fabs(s.normal[i]), s.error[i]);
   return s;
 }
 
 /// The point of a plane where a ray hits it at t; the normal is the plane's. p = origin + t·direction is
-/// moved along the normal by its height h, which is known to γ₄² of its terms m besides a few roundings of
-/// its own:
-///     error = (γ₈|h| + γ₄²·m)|nᵢ| + u|pᵢ|,    m = Σ|nᵢpᵢ| + |offset|.
+/// moved along the normal by its height h. That is known to γ₄² of its terms, which is nothing beside what
+/// rounding the coordinates of the point costs, and to some roundings of its own:
+///     error = γ₈|h·nᵢ| + u|pᵢ|.
 template <class T>
 TRILHA_HD inline SurfacePointOf<T> plane_point(const Plane& plane, const RayOf<T>& ray, T t) {
-  constexpr T u = unit_roundoff<T>, four = static_cast<T>(gamma<T>(4)), eight = static_cast<T>(gamma<T>(8));
-  constexpr T lost = 4 * std::numeric_limits<T>::denorm_min();
+  constexpr T eight = static_cast<T>(gamma<T>(8)), lost = 4 * std::numeric_limits<T>::denorm_min();
   const Vec3<T> n(plane.normal), p = along(ray, t, ray.origin);
-  const T offset = plane.offset, square = fused_dot(n, n);
-  const T height = compensated_dot(n, p, T(-1), offset) / square;
-  const T terms =
-      (std::fabs(n.x * p.x) + std::fabs(n.y * p.y) + std::fabs(n.z * p.z) + std::fabs(offset)) / square;
-  const T uncertain = fma(eight, std::fabs(height), 2 * four * four * terms);
+  const T height = compensated_dot(n, p, T(-1), T(plane.offset)) / fused_dot(n, n);
   SurfacePointOf<T> s;
   s.normal = unit(n);
   for (int i = 0; i < 3; ++i) {
     s.point[i] = fma(-height, n[i], p[i]);
-    s.error[i] = fma(uncertain, std::fabs(n[i]), fma(2 * u, std::fabs(s.point[i]), lost));
+    s.error[i] = fma(eight, std::fabs(height * n[i]), fma(of_coordinate<T>, std::fabs(s.point[i]), lost));
   }
   return s;
 }
@@ -138,8 +139,8 @@ TRILHA_HD inline SurfacePointOf<T> plane_point(const Plane& plane, const RayOf<T
 /// The normal is e₁×e₂, its differences of products right up to 2u, plus what e₁ and e₂ rounded off, crossed
 /// with e₂ and e₁: without that, every rounding of an edge would be multiplied by 1/sin of a sliver's angle.
 /// Twice rounded terms stay, below 24u²|e₁||e₂|. With θ that over |e₁×e₂|, a component of the true normal is
-/// off by θ, besides γ₇ of itself; so θ·Σerror along the normal is added, and half as much again for the
-/// rounding away from the surface in offsets.h.
+/// off by θ, besides γ₇ of itself; so θ·Σerror along the normal is added, and three times as much again for
+/// the rounding away from the surface in offsets.h.
 template <class T>
 TRILHA_HD inline SurfacePointOf<T> triangle_point(const Vec3<T>& a, const Vec3<T>& b, const Vec3<T>& c, T u,
                                                   T v) {
@@ -151,8 +152,8 @@ TRILHA_HD inline SurfacePointOf<T> triangle_point(const Vec3<T>& a, const Vec3<T
   for (int i = 0; i < 3; ++i) {
     const T along_e1 = u * e1[i], along_e2 = v * e2[i];
     s.point[i] = a[i] + fma(u, e1[i], along_e2);
-    s.error[i] =
-        fma(three, std::fabs(along_e1) + std::fabs(along_e2), fma(2 * half, std::fabs(s.point[i]), lost));
+    s.error[i] = fma(three, std::fabs(along_e1) + std::fabs(along_e2),
+                     fma(of_coordinate<T>, std::fabs(s.point[i]), lost));
   }
   const T scale1 = scale_to_one(largest(e1)), scale2 = scale_to_one(largest(e2));
   const Vec3<T> f1 = e1 * scale1, f2 = e2 * scale2;
@@ -163,7 +164,7 @@ TRILHA_HD inline SurfacePointOf<T> triangle_point(const Vec3<T>& a, const Vec3<T
   const Vec3<T> n = main + (fused_cross(f1, rest2) + fused_cross(rest1, f2));
   s.normal = unit(n);
   const T sizes = fused_dot(f1, f1) * fused_dot(f2, f2), area2 = largest(n);
-  const T theta = 64 * half * (half * std::sqrt(sizes)) / area2;
+  const T theta = 96 * half * (half * std::sqrt(sizes)) / area2;
   const T sideways = theta * (s.error.x + s.error.y + s.error.z);
   if (sideways <= std::numeric_limits<T>::max())  // else there is no normal
     for (int i = 0; i < 3; ++i) s.error[i] = fma(sideways, std::fabs(s.normal[i]), s.error[i]);
