@@ -46,7 +46,8 @@ SceneTextures::SceneTextures(const Scene& scene, const Stream& stream, const std
     for (std::int32_t k = 0; k < to.levels; ++k) {
       const TextureLevel& level = from.levels[static_cast<std::size_t>(k)];
       const std::size_t there = to.in_floats ? level.floats.size() : level.bytes.size();
-      const bool has_sides = level.width > 0 && level.height > 0;
+      const auto is_side = [](int side) { return side > 0 && side <= most_texture_side; };
+      const bool has_sides = is_side(level.width) && is_side(level.height);
       const std::uint64_t area =
           has_sides ? static_cast<std::uint64_t>(level.width) * static_cast<std::uint64_t>(level.height) : 0;
       if (area == 0 || there != area)

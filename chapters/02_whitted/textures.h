@@ -29,6 +29,9 @@ inline const char* name(TextureFilter filter) {
 
 // ---- views -------------------------------------------------------------------
 
+/// The longest side of a texture: up to here, texels and halves of them are floats.
+constexpr std::int32_t most_texture_side = 1 << 23;
+
 /// Where the texels of a level begin in the array that holds them: row by row from the top.
 struct TextureLevelView {
   std::uint64_t first = 0;
@@ -376,7 +379,8 @@ class SceneTextures {
   SceneTextures() = default;
   /// `wanted` has one answer a texture. Without `mip_levels` only the largest level of each is there, which
   /// is all that nearest and bilinear look at. Throws std::bad_alloc where the backend has no room,
-  /// std::logic_error where a level does not have width × height texels.
+  /// std::logic_error where a level does not have width × height texels, or has a side beyond
+  /// most_texture_side.
   SceneTextures(const Scene& scene, const Stream& stream, const std::vector<bool>& wanted, bool mip_levels);
 
   TexturesView view() const;
