@@ -614,6 +614,18 @@ TEST_CASE("a ramp of heights tilts the normal by its slope") {
   CHECK(std::fabs(far.x - 1) < 0.3f);
   CHECK(map_slopes(view, map, TextureFilter::bilinear, {1e30f, not_a_number}, 0) == vec2(0));
   CHECK(map_slopes(view, none, TextureFilter::bilinear, uv, 0) == vec2(0));
+  // A step is as wide as a texel of the level that is looked at, and others than trilinear look at the first.
+  const Scene steps = scene_of(random_floats(32, 8, TextureUse::data, true, 1));
+  const SceneTextures of_steps = uploaded(steps);
+  const TextureView& texture_view = of_steps.view().textures[0];
+  for (const TextureFilter filter : {TextureFilter::nearest, TextureFilter::bilinear})
+    CHECK(map_slopes(of_steps.view(), map, filter, uv, 3) == map_slopes(of_steps.view(), map, filter, uv, 0));
+  const auto size = [&](float level) {
+    return texel_size(of_steps.view(), texture_view, TextureFilter::trilinear, level);
+  };
+  CHECK(size(0) == vec2(1.0f / 32, 1.0f / 8));
+  CHECK(size(1.5f) == vec2(1.5f / 16, 1.5f / 4));
+  CHECK(size(99) == vec2(1));
 }
 
 // Catches: an axis exchanged or turned, the hand of a mirrored image forgotten, a scale on z.
