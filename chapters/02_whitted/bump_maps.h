@@ -74,11 +74,8 @@ constexpr double least_cosine = 0x1p-10;
 /// `normal`. The cosine of the result is at least 0.99·least_cosine.
 template <class T>
 TRILHA_HD inline Vec3<T> above_surface(Vec3<T> tilted, const Vec3<T>& normal, const Vec3<T>& geometric) {
-  const Vec3<T> direction = tilted;
-  if (!normalise(tilted))
-    tilted = normal;
-  else if (direction == normal)
-    tilted = normal;  // to the last bit: it was of length one
+  // A normal that nothing tilted has length one: dividing by it would change its last bit.
+  if (tilted == normal || !normalise(tilted)) tilted = normal;
   const T cosine = fused_dot(tilted, geometric);
   if (cosine >= T(least_cosine)) return tilted;
   Vec3<T> lifted = tilted + geometric * (T(least_cosine) - cosine);

@@ -326,7 +326,7 @@ TRILHA_HD inline T turns(T y, T x) {
 }
 
 /// Longitude and latitude on a sphere where the normal, of length one, is that: u grows to the right seen
-/// from outside and is ½ at +z, v grows from 0 at −y to 1 at +y. Both in [0, 1], to 1.5e-7. The seam lies at
+/// from outside and is ½ at +z, v grows from 0 at −y to 1 at +y. Both in [0, 1], to 2e-7. The seam lies at
 /// −z; at the poles u is ½.
 template <class T>
 TRILHA_HD inline Vec2<T> sphere_uv(const Vec3<T>& normal) {
@@ -334,8 +334,8 @@ TRILHA_HD inline Vec2<T> sphere_uv(const Vec3<T>& normal) {
   return {T(0.5) + turns(normal.x, normal.z), T(0.5) + 2 * turns(normal.y, from_axis)};
 }
 
-/// uv_density of a sphere: grows without end towards the poles, where it is that of 2⁻⁷ from the axis. 0 for
-/// a radius of 0.
+/// uv_density of a sphere. It grows towards the poles, and is held there at what it is where sin θ = 2⁻⁷. 0
+/// for a radius of 0.
 template <class T>
 TRILHA_HD inline T sphere_uv_density(T radius, const Vec3<T>& normal) {
   const T from_axis = std::sqrt(fma(normal.x, normal.x, normal.z * normal.z));
