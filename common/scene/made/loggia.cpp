@@ -99,8 +99,9 @@ class Loggia {
     make_arcade();
     make_screens();
     make_tree();
+    make_avenue();
     make_lights();
-    scene_.camera = {{0.15f, 1.6f, 7.3f}, {-0.25f, 1.75f, -12}, {0, 1, 0}, 48};
+    scene_.camera = {{-0.75f, 1.55f, 7.4f}, {0.55f, 1.7f, -6}, {0, 1, 0}, 46};
     scene_.views = {{"loggia", scene_.camera},
                     {"horizon", {{1.2f, 1.1f, -14}, {1.6f, 1.0f, -80}, {0, 1, 0}, 35}},
                     {"mirror", {{1.3f, 1.6f, 1.6f}, {-2.4f, 1.75f, -1.9f}, {0, 1, 0}, 50}},
@@ -116,6 +117,7 @@ class Loggia {
   void make_arcade();
   void make_screens();
   void make_tree();
+  void make_avenue();
   void make_lights();
 
   /// A texture, unless none are wanted.
@@ -301,7 +303,7 @@ void Loggia::make_arcade() {
 void Loggia::make_screens() {
   MeshBuilder screens("screens");
   const double lattice = facts(HallTexture::grille).period.x;
-  for (const int i : {1, 3}) {
+  for (const int i : {1, 4}) {
     const double z = first_column - (i + 1) * bay + 0.25, wide = bay - 0.5;
     screens.material(fretwork).quad({half_width, 0, z}, {0, 0, wide}, {0, spring - 0.1, 0}, lattice);
     screens.material(wood).box({half_width - 0.04, spring - 0.1, z}, {half_width + 0.04, spring, z + wide},
@@ -310,7 +312,7 @@ void Loggia::make_screens() {
   add(screens);
 
   MeshBuilder cloth("curtain");
-  const double z = first_column - 3 * bay + 0.3, wide = bay - 0.6, high = 2.5;
+  const double z = first_column - 4 * bay + 0.3, wide = bay - 0.6, high = 2.5;
   cloth.material(curtain).surface(
       24, 1,
       [&](double s, double t) {
@@ -338,7 +340,7 @@ void Loggia::make_tree() {
   trunk.materials.assign(trunk.triangles.size(), wood);
   scene_.meshes.push_back(std::move(trunk));
 
-  constexpr int leaves = 150;
+  constexpr int leaves = 200;
   constexpr double golden = 137.50776405003785;  // degrees: 360·(2 − the golden ratio)
   MeshBuilder foliage("leaves");
   foliage.material(leaf);
@@ -352,11 +354,11 @@ void Loggia::make_tree() {
   };
   for (int i = 0; i < leaves; ++i) {
     const dvec3 out = outwards(1 - 1.8 * (i + 0.5) / leaves, golden * i);
-    const dvec3 from = crown + (0.2 + 0.26 * chance(i, 1)) * out;
+    const dvec3 from = crown + (0.14 + 0.28 * chance(i, 1)) * out;
     const dvec3 way = glm::normalize(
-        out + dvec3(0.9 * chance(i, 2) - 0.45, 0.35 - 0.9 * chance(i, 3), 0.9 * chance(i, 4) - 0.45));
+        out + dvec3(2 * chance(i, 2) - 1, 0.5 - 1.5 * chance(i, 3), 2 * chance(i, 4) - 1));
     const dvec3 side = glm::normalize(glm::cross(way, dvec3(chance(i, 5) - 0.5, 1.2, chance(i, 6) - 0.5)));
-    const double length = 0.20 + 0.07 * chance(i, 7), wide = 0.45 * length;
+    const double length = 0.20 + 0.07 * chance(i, 7), wide = 0.55 * length;
     foliage.grid(1, 1, [&](int u, int v) {
       return Vertex{from + (u - 0.5) * wide * side + double(v) * length * way, glm::cross(side, way),
                     dvec2(u, v)};
@@ -368,16 +370,32 @@ void Loggia::make_tree() {
         {vec3(crown + 0.43 * outwards(0.55 - 1.1 * i / 7, 101.0 * i + 20)), 0.062f, orange});
 }
 
+/// Cypresses far out: two sheets each, of which the leaf's outline is cut.
+void Loggia::make_avenue() {
+  MeshBuilder trees("cypresses");
+  trees.material(leaf);
+  for (const double z : {-34.0, -48.0, -66.0, -90.0, -124.0, -170.0, -230.0})
+    for (const double x : {-6.5, 6.5, 26.0}) {
+      const double wide = 1.1, high = x > 20 ? 9 : 7.5;
+      trees.quad({x - wide, -0.1, z}, {2 * wide, 0, 0}, {0, high, 0}, 1);
+      trees.quad({x, -0.1, z + wide}, {0, 0, -2 * wide}, {0, high, 0}, 1);
+    }
+  Mesh mesh = trees.take();
+  for (std::size_t i = 0; i < mesh.texture_coordinates.size(); ++i)  // the leaf once, not by the metre
+    mesh.texture_coordinates[i] = {i % 2, i / 2 % 2};
+  scene_.meshes.push_back(std::move(mesh));
+}
+
 void Loggia::make_lights() {
   Light sun;
   sun.name = "sun";
   sun.kind = Light::Kind::directional;
   sun.direction = glm::normalize(vec3(-0.80f, -0.66f, -0.33f));
-  sun.intensity = {1.25f, 1.12f, 0.90f};
+  sun.intensity = {1.75f, 1.52f, 1.15f};
   scene_.lights.push_back(sun);
-  constexpr float lamp_y = 3.5f, lamp_z = -4.3f;
-  scene_.spheres.push_back({{0, lamp_y, lamp_z}, 0.13f, lamp_glass});
-  scene_.lights.push_back(point_light("lamp", {0, lamp_y - 0.2f, lamp_z}, {2.4f, 1.7f, 1.0f}));
+  constexpr float lamp_y = 3.95f, lamp_z = -4.3f;
+  scene_.spheres.push_back({{0, lamp_y, lamp_z}, 0.1f, lamp_glass});
+  scene_.lights.push_back(point_light("lamp", {0, lamp_y - 0.55f, lamp_z}, {2.4f, 1.7f, 1.0f}));
   Light wash;
   wash.name = "wash on the wall";
   wash.kind = Light::Kind::spot;
@@ -387,7 +405,7 @@ void Loggia::make_lights() {
   wash.inner_angle = 10;
   wash.outer_angle = 36;
   scene_.lights.push_back(wash);
-  scene_.ambient = {0.26f, 0.28f, 0.33f};
+  scene_.ambient = {0.24f, 0.27f, 0.33f};
   scene_.environment.colour = {0.40f, 0.58f, 0.86f};
 }
 

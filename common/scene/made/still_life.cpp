@@ -76,20 +76,20 @@ std::vector<Material> make_materials() {
   polished(ivory, "ivory", {0.80f, 0.74f, 0.62f}, vec3(0.10f), 60, vec3(0.07f));
   polished(slate, "slate", {0.055f, 0.085f, 0.11f}, vec3(0.25f), 90, vec3(0.12f));
   polished(edge, "edge", {0.20f, 0.11f, 0.06f}, vec3(0.10f), 40, vec3(0));
-  matt(backdrop, "backdrop", {0.36f, 0.37f, 0.44f});
+  matt(backdrop, "backdrop", {0.20f, 0.25f, 0.33f});
   matt(stone, "stone", {0.62f, 0.58f, 0.52f});
-  polished(silver, "silver", {0.055f, 0.054f, 0.052f}, vec3(0.7f), 180, {0.84f, 0.82f, 0.78f});
+  polished(silver, "silver", {0.04f, 0.039f, 0.037f}, vec3(0.7f), 180, {0.86f, 0.84f, 0.79f});
   polished(mirror, "mirror", vec3(0.01f), vec3(0), 0, {0.88f, 0.90f, 0.89f});
   polished(frame, "brass", {0.34f, 0.21f, 0.07f}, {0.75f, 0.55f, 0.25f}, 50, {0.28f, 0.19f, 0.08f});
   clear(crystal, "crystal", 1.52f, 0.08f, 0.92f, {0.03f, 0.015f, 0.02f});
   clear(air, "air in glass", 1, 0.05f, 0.95f, vec3(0));
   clear(window_glass, "glass", 1.5f, 0.07f, 0.93f, {0.12f, 0.05f, 0.07f});
-  clear(water, "water", 1.333f, 0.03f, 0.97f, {0.10f, 0.04f, 0.025f});
-  clear(gem, "gem", 1.9f, 0.12f, 0.88f, {1.7f, 0.35f, 0.75f});
-  clear(amber, "amber", 1.54f, 0.07f, 0.93f, {0.25f, 1.15f, 3.6f});
-  clear(sapphire, "sapphire", 1.6f, 0.08f, 0.92f, {3.4f, 1.6f, 0.25f});
-  clear(emerald, "emerald", 1.57f, 0.08f, 0.92f, {3.2f, 0.35f, 1.7f});
-  clear(ruby, "ruby", 1.7f, 0.09f, 0.91f, {0.3f, 4.2f, 3.4f});
+  clear(water, "water", 1.333f, 0.03f, 0.97f, {0.32f, 0.10f, 0.05f});
+  clear(gem, "gem", 1.9f, 0.12f, 0.88f, {1.9f, 0.3f, 0.85f});
+  clear(amber, "amber", 1.54f, 0.07f, 0.93f, {0.25f, 1.9f, 6.5f});
+  clear(sapphire, "sapphire", 1.6f, 0.08f, 0.92f, {9.0f, 4.2f, 0.6f});
+  clear(emerald, "emerald", 1.57f, 0.08f, 0.92f, {8.0f, 0.8f, 4.6f});
+  clear(ruby, "ruby", 1.7f, 0.09f, 0.91f, {0.6f, 10.0f, 7.5f});
   polished(red_lacquer, "red lacquer", {0.62f, 0.035f, 0.03f}, vec3(0.8f), 260, vec3(0.10f));
   polished(green_lacquer, "green lacquer", {0.03f, 0.26f, 0.20f}, vec3(0.8f), 260, vec3(0.10f));
   polished(pearl, "pearl", {0.80f, 0.76f, 0.72f}, vec3(0.45f), 50, vec3(0.06f));
@@ -105,16 +105,17 @@ struct Softbox {
   dvec3 centre, across, up;  ///< half its sides; it gives light where across × up points
 };
 const Softbox softboxes[] = {{{-4.6, 7.6, 6.2}, {1.5, 0, 1.05}, {0.55, 1.0, -0.8}},
-                             {{7.2, 3.4, 3.6}, {0.35, 0, -0.65}, {0, 2.4, 0}}};
+                             {{7.4, 3.4, 5.4}, {0.5, 0, -0.65}, {0, 2.4, 0}},
+                             {{-1.2, 9.5, -1.6}, {2.6, 0, 0}, {0, 0, 1.4}}};
 
 void add_lights(Scene& scene) {
   scene.lights.push_back(point_light("key", {-3.9f, 6.7f, 5.3f}, {82, 76, 66}));
   Light glow;
   glow.name = "glow on the backdrop";
   glow.kind = Light::Kind::spot;
-  glow.position = {1.0f, 0.9f, -6.2f};
-  glow.direction = glm::normalize(vec3(0, 0.22f, -1));
-  glow.intensity = {30, 17, 9};
+  glow.position = {1.3f, 0.5f, -6.9f};
+  glow.direction = glm::normalize(vec3(0, 0.12f, -1));
+  glow.intensity = {34, 17, 7};
   glow.inner_angle = 0;
   glow.outer_angle = 80;
   scene.lights.push_back(glow);
@@ -122,10 +123,10 @@ void add_lights(Scene& scene) {
   fill.name = "fill";
   fill.kind = Light::Kind::directional;
   fill.direction = glm::normalize(vec3(-0.42f, -1, -0.62f));
-  fill.intensity = {0.22f, 0.27f, 0.36f};
+  fill.intensity = {0.20f, 0.25f, 0.34f};
   scene.lights.push_back(fill);
-  scene.ambient = {0.13f, 0.14f, 0.17f};
-  scene.environment.colour = {0.10f, 0.13f, 0.19f};
+  scene.ambient = {0.11f, 0.125f, 0.16f};
+  scene.environment.colour = {0.055f, 0.075f, 0.12f};
 }
 
 /// The mesh without texture coordinates, which nothing here needs.
@@ -324,7 +325,7 @@ constexpr Ball balls[] = {
     {-3.05, 0.75, 0.46, red_lacquer},  {-0.62, 1.35, 0.62, crystal}, {0.42, 2.05, 0.30, amber},
     {2.95, 1.15, 0.40, green_lacquer}, {-2.35, 1.95, 0.17, pearl},   {-0.30, 2.50, 0.16, sapphire},
     {1.42, 2.25, 0.18, ruby},          {-1.28, 2.62, 0.13, emerald}, {2.12, 2.05, 0.14, crystal},
-    {-3.75, 1.75, 0.15, amber},        {3.62, 1.75, 0.16, pearl}};
+    {-3.75, 1.75, 0.15, amber},        {3.35, 0.35, 0.16, pearl}};
 
 // A blown ball: what lies between its two spheres is glass. It hangs in the air, as Whitted's did.
 constexpr double bubble_radius = 0.62, bubble_wall = 0.045;
@@ -363,7 +364,7 @@ Scene make(const Parameters& parameters) {
   scene.spheres.push_back({vec3(bubble_centre), float(bubble_radius - bubble_wall), air});
   scene.planes.push_back({{0, 1, 0}, -0.08f, ground});
   add_lights(scene);
-  scene.camera = {{0.5f, 2.7f, 9.3f}, {0.02f, 1.05f, 0}, {0, 1, 0}, 28};
+  scene.camera = {{0.45f, 3.35f, 9.5f}, {0.0f, 0.98f, 0}, {0, 1, 0}, 28.5f};
   scene.views = {{"table", scene.camera},
                  {"tumbler", {{1.3f, 1.75f, 4.6f}, {1.12f, 1.0f, 0.3f}, {0, 1, 0}, 30}},
                  {"gem", {{-2.1f, 1.35f, 4.6f}, {-1.35f, 0.42f, 1.6f}, {0, 1, 0}, 30}},
@@ -374,7 +375,7 @@ Scene make(const Parameters& parameters) {
 
 MadeSize size(const Parameters& parameters) {
   const auto quads = static_cast<std::uint64_t>(parameters.whole("quads"));
-  const std::uint64_t teapot = 64 * quads * quads - 8 * quads, pedestal_and_softboxes = 12 + 2 * 2;
+  const std::uint64_t teapot = 64 * quads * quads - 8 * quads, pedestal_and_softboxes = 12 + 2 * std::size(softboxes);
   const std::uint64_t triangles = board_triangles + backdrop_triangles + pedestal_and_softboxes + teapot +
                                   mirror_triangles + tumbler_triangles + water_triangles + straw_triangles +
                                   gem_triangles;
