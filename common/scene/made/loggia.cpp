@@ -355,8 +355,8 @@ void Loggia::make_tree() {
   for (int i = 0; i < leaves; ++i) {
     const dvec3 out = outwards(1 - 1.8 * (i + 0.5) / leaves, golden * i);
     const dvec3 from = crown + (0.14 + 0.28 * chance(i, 1)) * out;
-    const dvec3 way = glm::normalize(
-        out + dvec3(2 * chance(i, 2) - 1, 0.5 - 1.5 * chance(i, 3), 2 * chance(i, 4) - 1));
+    const dvec3 way =
+        glm::normalize(out + dvec3(2 * chance(i, 2) - 1, 0.5 - 1.5 * chance(i, 3), 2 * chance(i, 4) - 1));
     const dvec3 side = glm::normalize(glm::cross(way, dvec3(chance(i, 5) - 0.5, 1.2, chance(i, 6) - 0.5)));
     const double length = 0.20 + 0.07 * chance(i, 7), wide = 0.55 * length;
     foliage.grid(1, 1, [&](int u, int v) {

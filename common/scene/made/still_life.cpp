@@ -375,7 +375,8 @@ Scene make(const Parameters& parameters) {
 
 MadeSize size(const Parameters& parameters) {
   const auto quads = static_cast<std::uint64_t>(parameters.whole("quads"));
-  const std::uint64_t teapot = 64 * quads * quads - 8 * quads, pedestal_and_softboxes = 12 + 2 * std::size(softboxes);
+  const std::uint64_t teapot = 64 * quads * quads - 8 * quads,
+                      pedestal_and_softboxes = 12 + 2 * std::size(softboxes);
   const std::uint64_t triangles = board_triangles + backdrop_triangles + pedestal_and_softboxes + teapot +
                                   mirror_triangles + tumbler_triangles + water_triangles + straw_triangles +
                                   gem_triangles;
