@@ -98,7 +98,9 @@ void spot(Scene& scene, const Parameters&) {
 
 void ambient(Scene& scene, const Parameters&) { scene.ambient = {0.2f, 0.2f, 0.3f}; }
 
+/// The lamp stands where the floor would mirror it to the eye.
 void highlight(Scene& scene, const Parameters&) {
+  scene.lights = {point_light("lamp", {-4, 4.5f, -4}, vec3(40))};
   scene.materials[floor].specular = vec3(0.8f);
   scene.materials[floor].shininess = 20;
 }
@@ -183,14 +185,14 @@ void normal_map(Scene& scene, const Parameters& parameters) {
   });
 }
 
-/// Ridges of a quarter of a unit.
+/// Ridges of half a unit.
 void bump(Scene& scene, const Parameters& parameters) {
   textured_floor(scene);
   scene.materials[floor].bump_map = texture(scene, parameters, TextureUse::data, [](int x, int) {
     constexpr int ridge[4] = {0, 128, 255, 128};
     return grey(ridge[x % 4]);
   });
-  scene.materials[floor].bump_scale = 0.25f;
+  scene.materials[floor].bump_scale = 0.5f;
 }
 
 /// A panel in front of the block.

@@ -46,6 +46,7 @@ enum StillLifeMaterial : std::uint32_t {
   straw_white,
   straw_red,
   softbox,
+  warm_card,
   material_count
 };
 
@@ -96,17 +97,20 @@ std::vector<Material> make_materials() {
   matt(straw_white, "straw, white", {0.85f, 0.83f, 0.78f});
   matt(straw_red, "straw, red", {0.75f, 0.09f, 0.08f});
   matt(softbox, "softbox", vec3(0.2f)).emission = {2.6f, 2.5f, 2.35f};
+  matt(warm_card, "warm card", vec3(0.2f)).emission = {0.85f, 0.50f, 0.24f};
   return list;
 }
 
-/// The lights stand outside all that is seen; the softboxes behind them are what silver and glass show of
-/// them.
+/// What the studio has beside its lights, which are points: faces that give light to nothing but the eye, for
+/// silver and glass to show.
 struct Softbox {
   dvec3 centre, across, up;  ///< half its sides; it gives light where across × up points
+  StillLifeMaterial material = softbox;
 };
 const Softbox softboxes[] = {{{-4.6, 7.6, 6.2}, {1.5, 0, 1.05}, {0.55, 1.0, -0.8}},
                              {{7.4, 3.4, 5.4}, {0.5, 0, -0.65}, {0, 2.4, 0}},
-                             {{-1.2, 9.5, -1.6}, {2.6, 0, 0}, {0, 0, 1.4}}};
+                             {{-1.2, 9.5, -1.6}, {2.6, 0, 0}, {0, 0, 1.4}},
+                             {{-9.5, 2.6, 2.0}, {0, 0, -2.6}, {0, 2.6, 0}, warm_card}};
 
 void add_lights(Scene& scene) {
   scene.lights.push_back(point_light("key", {-3.9f, 6.7f, 5.3f}, {82, 76, 66}));
@@ -156,12 +160,12 @@ constexpr std::uint64_t board_triangles = 2 * 16 * 10 + 8;
 
 /// Paper that hangs down and runs out on the ground, as photographers have it.
 Mesh sweep_of_paper() {
-  constexpr double half = 17, low = -0.05, turn_at = 3;
+  constexpr double half = 34, low = -0.05, turn_at = 3;
   constexpr int curve = 8;
   MeshBuilder builder("backdrop");
   builder.material(backdrop).grid(1, curve + 2, [&](int i, int j) {
     const double x = i == 0 ? -half : half;
-    if (j == 0) return Vertex{{x, low, -6.4}, {0, 1, 0}, dvec2(0)};
+    if (j == 0) return Vertex{{x, low, -6.02}, {0, 1, 0}, dvec2(0)};
     if (j == curve + 2) return Vertex{{x, 12, -7.4 - turn_at}, {0, 0, 1}, dvec2(0)};
     const auto [cosine, sine] = turn(90.0 * (j - 1) / curve);
     return Vertex{{x, low + turn_at * (1 - cosine), -7.4 - turn_at * sine}, {0, cosine, sine}, dvec2(0)};
@@ -325,7 +329,7 @@ constexpr Ball balls[] = {
     {-3.05, 0.75, 0.46, red_lacquer},  {-0.62, 1.35, 0.62, crystal}, {0.42, 2.05, 0.30, amber},
     {2.95, 1.15, 0.40, green_lacquer}, {-2.35, 1.95, 0.17, pearl},   {-0.30, 2.50, 0.16, sapphire},
     {1.42, 2.25, 0.18, ruby},          {-1.28, 2.62, 0.13, emerald}, {2.12, 2.05, 0.14, crystal},
-    {-3.75, 1.75, 0.15, amber},        {3.35, 0.35, 0.16, pearl}};
+    {-3.42, 1.62, 0.15, amber},        {3.35, 0.35, 0.16, pearl}};
 
 // A blown ball: what lies between its two spheres is glass. It hangs in the air, as Whitted's did.
 constexpr double bubble_radius = 0.62, bubble_wall = 0.045;
@@ -345,12 +349,12 @@ Scene make(const Parameters& parameters) {
   boxes.name = "softboxes";
   for (const Softbox& s : softboxes)
     add_quad(boxes, s.centre - s.across - s.up, s.centre + s.across - s.up, s.centre + s.across + s.up,
-             s.centre - s.across + s.up, softbox);
+             s.centre - s.across + s.up, s.material);
   scene.meshes = {board(),
                   sweep_of_paper(),
                   std::move(pedestal_stone),
                   teapot(parameters.whole("quads"), {-1.35, gap, -1.15}, 0.62, 198),
-                  standing_mirror({-3.7, gap, -2.7}, 2.7, 3.7, 42),
+                  standing_mirror({-3.7, gap, -2.7}, 2.5, 3.0, 42),
                   tumbler(tumbler_foot),
                   water_in_tumbler(tumbler_foot),
                   straw(tumbler_foot),
@@ -368,7 +372,7 @@ Scene make(const Parameters& parameters) {
   scene.views = {{"table", scene.camera},
                  {"tumbler", {{1.3f, 1.75f, 4.6f}, {1.12f, 1.0f, 0.3f}, {0, 1, 0}, 30}},
                  {"gem", {{-2.1f, 1.35f, 4.6f}, {-1.35f, 0.42f, 1.6f}, {0, 1, 0}, 30}},
-                 {"mirror", {{1.6f, 2.3f, 3.6f}, {-2.6f, 1.25f, -1.9f}, {0, 1, 0}, 38}}};
+                 {"mirror", {{1.1f, 2.9f, 2.5f}, {-2.5f, 1.45f, -2.3f}, {0, 1, 0}, 36}}};
   finish(scene, {0, 1, 0}, true);
   return scene;
 }
