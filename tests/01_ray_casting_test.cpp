@@ -334,6 +334,115 @@ TEST_CASE("occluded says whether there is a closest hit, and stops at the first"
   CHECK(found > 300);
 }
 
+namespace {
+
+/// Rays that a soup of the same seed meets in all the ways that its pairs do, some with intervals in which
+/// nothing can be hit, some that never end.
+std::vector<Ray> hostile_rays(std::size_t n, std::uint64_t seed) {
+  std::vector<Ray> rays(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    Random random(seed, i);
+    rays[i] = make_pair(random, static_cast<PairKind>(random.index(pair_kinds))).ray;
+    const float t = random.uniform(-1, 2), nan = std::numeric_limits<float>::quiet_NaN();
+    const std::pair<float, float> intervals[] = {
+        {0, INFINITY},   {0, t},   {t, t},     {t, t - 1},
+        {nan, INFINITY}, {0, nan}, {t, 1e30f}, {-INFINITY, INFINITY}};
+    std::tie(rays[i].t_min, rays[i].t_max) = intervals[random.index(8)];
+  }
+  return rays;
+}
+
+/// Where occluded_triangles says something else than trace_triangles finds: how many rays of one test,
+/// scalar, loop and machine. Adds to the rays that are occluded.
+template <class Test, class T>
+std::size_t false_shadows(const Stream& stream, Loop loop, const Mesh& mesh, bool one_sided,
+                          const std::vector<Ray>& rays, std::size_t& occluded) {
+  const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
+  const Buffer<vec3> positions(stream, mesh.positions);
+  const Buffer<uvec3> corners(stream, mesh.triangles);
+  const Buffer<T> numbers = prepare_triangles<Test, T>(stream, loop, positions.data(), corners.data(), count);
+  const Triangles<Test, T> triangles{numbers.data(), count, one_sided};
+  std::vector<RayOf<T>> of_scalar;
+  for (const Ray& ray : rays) of_scalar.push_back(ray.as<T>());
+  const Buffer<RayOf<T>> asked(stream, of_scalar);
+  Buffer<HitOf<T>> hits(stream.backend(), rays.size());
+  trace_triangles(stream, loop, triangles, asked.data(), hits.data(), rays.size());
+  Buffer<std::uint8_t> answers(stream, std::vector<std::uint8_t>(rays.size(), 7));
+  occluded_triangles(stream, loop, triangles, asked.data(), answers.data(), rays.size());
+  const std::vector<HitOf<T>> found = hits.to_vector(stream);
+  const std::vector<std::uint8_t> said = answers.to_vector(stream);
+  std::size_t differences = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    differences += said[i] != (found[i].found() ? 1 : 0);
+    occluded += said[i];
+  }
+  return differences;
+}
+
+}  // namespace
+
+// Catches: in any loop, scalar and test, a shadow where no hit is or none where one is: a ray that is taken
+// for done too soon, in another's place or in the last batch; an interval that is left; a byte that is
+// neither 0 nor 1 or was not written.
+TEST_CASE("every loop says occluded where it finds a closest hit, of random and hostile rays") {
+  for (const std::uint32_t count : {0u, 1u, 16u, 17u, 128u, 129u, 700u, 2000u})
+    for (const bool hostile : {false, true}) {
+      const Mesh mesh = soup(count, 21, hostile);
+      std::vector<Ray> rays = random_rays(effort(500), 22);
+      const std::vector<Ray> more = hostile_rays(effort(513), 21);
+      rays.insert(rays.end(), more.begin(), more.end());
+      for (const Backend backend : backends())
+        for (const Loop loop : {Loop::plain, Loop::blocked})
+          for (const bool one_sided : {false, true})
+            with_every_test([&](auto test) {
+              using Test = decltype(test);
+              INFO(count << " triangles, hostile " << hostile << ", " << name_of<Test>() << ", loop "
+                         << int(loop) << ", one-sided " << one_sided << " on " << name(backend));
+              std::size_t in_float = 0, in_double = 0;
+              CHECK(false_shadows<Test, float>(backend, loop, mesh, one_sided, rays, in_float) == 0);
+              CHECK(false_shadows<Test, double>(backend, loop, mesh, one_sided, rays, in_double) == 0);
+              if (count < 128) return;
+              for (const std::size_t occluded : {in_float, in_double}) {
+                CHECK(occluded > rays.size() / 10);
+                CHECK(occluded < rays.size());
+              }
+            });
+    }
+}
+
+// Catches: a batch or block that ends while one of its rays is not done.
+TEST_CASE("a ray on its own is asked to the last triangle") {
+  const Mesh mesh = soup(2000, 21, false);
+  std::size_t occluded = 0;
+  for (const Ray& ray : random_rays(100, 26))
+    for (const Backend backend : backends())
+      for (const Loop loop : {Loop::plain, Loop::blocked})
+        CHECK(false_shadows<Watertight, float>(backend, loop, mesh, false, {ray}, occluded) == 0);
+  CHECK(occluded > 100);
+}
+
+// Catches: a part of the plain loop that forgets what the parts before it said.
+TEST_CASE("of very many triangles, too, the plain loop says occluded where it finds a hit") {
+  Mesh mesh = soup(1300000, 23, false);
+  for (std::size_t i = 0; i + 3 < mesh.positions.size(); ++i)  // all but one are far away from all rays
+    mesh.positions[i] += vec3(0, 0, 100);
+  std::swap(mesh.triangles.front(), mesh.triangles.back());
+  std::vector<Ray> rays;
+  const vec3 last = (mesh.positions.end()[-1] + mesh.positions.end()[-2] + mesh.positions.end()[-3]) / 3.0f;
+  for (const Ray& any : random_rays(24, 24)) {
+    Ray ray;
+    ray.origin = any.origin;
+    ray.direction = last - any.origin;  // meets that triangle, the first of all
+    if (rays.size() % 3 == 1) ray.direction = -any.origin + vec3(0, 0, 100);  // meets others
+    if (rays.size() % 3 == 2) ray.direction = vec3(0, 0, -1);
+    rays.push_back(ray);
+  }
+  std::size_t occluded = 0;
+  CHECK(false_shadows<Watertight, float>(Backend::cpu, Loop::plain, mesh, false, rays, occluded) == 0);
+  CHECK(false_shadows<Watertight, double>(Backend::cpu, Loop::blocked, mesh, false, rays, occluded) == 0);
+  CHECK(occluded == 2 * 16);
+}
+
 // Catches: leaks at edges and vertices, at any size and distance; a t that is worse than promised.
 TEST_CASE("the watertight test misses nothing from inside closed meshes, and keeps its bound") {
   struct Case {
@@ -739,6 +848,25 @@ TEST_CASE("a build that is cancelled ends by it and leaves no memory") {
     CHECK_FALSE(built);
     CHECK(live_bytes(backend) == before);
   }
+}
+
+// Catches: shadows that are cut short and given as found, or a long wait for them.
+TEST_CASE("asking what is occluded can be cancelled") {
+  const Mesh mesh = soup(400000, 25, false);
+  const std::vector<Ray> rays(4096, Ray{vec3(0, 0, 50), 0, vec3(0, 0, 1), INFINITY});  // meet nothing
+  for (const Backend backend : backends())
+    for (const Loop loop : {Loop::plain, Loop::blocked}) {
+      Cancellation cancellation;
+      std::thread other([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(backend == Backend::cpu ? 30 : 0));
+        cancellation.cancel();
+      });
+      std::size_t occluded = 0;
+      CHECK_FALSE(cancellation.run([&] {
+        for (;;) false_shadows<Watertight, float>(backend, loop, mesh, false, rays, occluded);
+      }));
+      other.join();
+    }
 }
 
 // Catches: a trace that is cut short and gives its hits as found, in any loop or scalar.

@@ -30,23 +30,63 @@ struct TracePart {
   }
 };
 
+/// Ray → whether it is occluded by the triangles so far, of which these are a part: number `first` and those
+/// after it.
+template <class Primitives>
+struct OccludePart {
+  using T = typename Primitives::Scalar;
+  Primitives part;
+  std::uint32_t first;
+  const RayOf<T>* rays;
+  std::uint8_t* occluded;
+
+  TRILHA_HD void operator()(std::size_t i) const {
+    if (first > 0 && occluded[i] != 0) return;
+    NoProbe probe;
+    occluded[i] = BruteForce<Primitives>{part}.occluded(rays[i], probe) ? 1 : 0;
+  }
+};
+
+/// The passes that answer a query: among all triangles, and among a part of them after others.
+template <Query query, class Primitives>
+using WholePass = std::conditional_t<query == Query::closest, Trace<BruteForce<Primitives>>,
+                                     Occlude<BruteForce<Primitives>>>;
+template <Query query, class Primitives>
+using PartPass = std::conditional_t<query == Query::closest, TracePart<Primitives>, OccludePart<Primitives>>;
+
 /// The plain loop. On the CPU a pass can be cancelled between batches, which should take a few milliseconds:
 /// of very many triangles a ray meets one part after the other. Smaller parts would stay in a cache, which is
 /// what the blocks are for.
-template <class Test, class T>
+template <Query query, class Test, class T>
 void trace_plain(const Stream& stream, const Triangles<Test, T>& triangles, const RayOf<T>* rays,
-                 HitOf<T>* hits, std::size_t n) {
+                 QueryAnswer<query, T>* answers, std::size_t n) {
   constexpr std::uint32_t most_triangles_a_part = 1 << 19, most_tests_a_batch = 1 << 17;
   const std::uint32_t count = triangles.count;
   const std::size_t batch = std::clamp<std::size_t>(most_tests_a_batch / std::max(count, 1u), 1, 64);
   if (stream.backend() == Backend::cuda || count <= most_triangles_a_part)
-    return for_each(stream, n, Trace<BruteForce<Triangles<Test, T>>>{{triangles}, 0, rays, hits}, batch);
+    return for_each(stream, n, WholePass<query, Triangles<Test, T>>{{triangles}, 0, rays, answers}, batch);
   for (std::size_t first = 0; first < count; first += most_triangles_a_part) {
     Triangles<Test, T> part = triangles;
     part.numbers += first * Test::numbers;
     part.count = static_cast<std::uint32_t>(std::min<std::size_t>(most_triangles_a_part, count - first));
-    for_each(stream, n, TracePart<Triangles<Test, T>>{part, static_cast<std::uint32_t>(first), rays, hits},
+    for_each(stream, n,
+             PartPass<query, Triangles<Test, T>>{part, static_cast<std::uint32_t>(first), rays, answers},
              batch);
+  }
+}
+
+/// Each ray's answer, by the loop's order on that backend.
+template <Query query, class Test, class T>
+void answer(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles, const RayOf<T>* rays,
+            QueryAnswer<query, T>* answers, std::size_t n) {
+  if (loop == Loop::plain) {
+    trace_plain<query>(stream, triangles, rays, answers, n);
+  } else if (stream.backend() == Backend::cpu) {
+    trace_blocks<query>(triangles, rays, answers, n);
+  } else {
+#if defined(__CUDACC__)
+    trace_tiles<query>(stream, triangles, rays, answers, n);
+#endif
   }
 }
 
@@ -66,22 +106,22 @@ Buffer<T> prepare_triangles(const Stream& stream, Loop loop, const vec3* positio
 template <class Test, class T>
 void trace_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles,
                      const RayOf<T>* rays, HitOf<T>* hits, std::size_t n) {
-  if (loop == Loop::plain) {
-    trace_plain(stream, triangles, rays, hits, n);
-  } else if (stream.backend() == Backend::cpu) {
-    trace_blocks(triangles, rays, hits, n);
-  } else {
-#if defined(__CUDACC__)
-    trace_tiles(stream, triangles, rays, hits, n);
-#endif
-  }
+  answer<Query::closest>(stream, loop, triangles, rays, hits, n);
+}
+
+template <class Test, class T>
+void occluded_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles,
+                        const RayOf<T>* rays, std::uint8_t* occluded, std::size_t n) {
+  answer<Query::occluded>(stream, loop, triangles, rays, occluded, n);
 }
 
 #define INSTANTIATE(Test, T)                                                                                \
   template Buffer<T> prepare_triangles<Test, T>(const Stream&, Loop, const vec3*, const uvec3*,             \
                                                 std::uint32_t);                                             \
   template void trace_triangles(const Stream&, Loop, const Triangles<Test, T>&, const RayOf<T>*, HitOf<T>*, \
-                                std::size_t);
+                                std::size_t);                                                               \
+  template void occluded_triangles(const Stream&, Loop, const Triangles<Test, T>&, const RayOf<T>*,         \
+                                   std::uint8_t*, std::size_t);
 TRILHA_EVERY_TEST_AND_SCALAR(INSTANTIATE)
 #undef INSTANTIATE
 

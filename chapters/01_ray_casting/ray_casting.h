@@ -5,6 +5,7 @@
 // and triangle_tiles are the same loop in the order that a CPU's vectors and a GPU's shared memory want.
 
 #include <functional>
+#include <type_traits>
 
 #include "chapters/01_ray_casting/ray_triangle.h"
 #include "common/image/film.h"
@@ -48,7 +49,8 @@ struct Triangles {
   using Scalar = T;
   const T* numbers;
   std::uint32_t count;
-  bool one_sided;  ///< only front faces can be hit
+  bool one_sided;             ///< only front faces can be hit
+  bool surely_ahead = false;  ///< t > 0 for sure: for rays that start on surfaces
 
   /// What the test wants to know of a ray, worked out once for all triangles.
   TRILHA_HD auto constants(const RayOf<T>& ray) const { return Test::constants(ray); }
@@ -59,16 +61,24 @@ struct Triangles {
                            HitOf<T>& hit) const {
     const Numbers<T> triangle{numbers + static_cast<std::size_t>(i) * Test::numbers};
     const auto measure = Test::measure(triangle, ray, constants);
-    if (Test::may_hit(measure)) settle(measure, i, ray, constants, hit);
+    if (Test::may_hit(measure)) settle(measure, triangle, i, ray, constants, hit);
   }
 
   /// The rare second half: the decision on a triangle that may_hit let pass.
   template <class Measure, class Constants>
-  TRILHA_HD void settle(const Measure& measure, std::uint32_t i, const RayOf<T>& ray,
-                        const Constants& constants, HitOf<T>& hit) const {
+  TRILHA_HD void settle(const Measure& measure, const Numbers<T>& triangle, std::uint32_t i,
+                        const RayOf<T>& ray, const Constants& constants, HitOf<T>& hit) const {
     Solution<T> s;
-    if (Test::solve(measure, ray, constants, s) && s.t >= ray.t_min && s.t < hit.t && (s.front || !one_sided))
-      hit = {s.t, i, 0, s.u, s.v};
+    if (!Test::solve(measure, ray, constants, s)) return;
+    if (!(s.t < hit.t && (s.front || !one_sided))) return;
+    if (surely_ahead) {
+      // a t within its error of zero says nothing: the surface that the ray starts on, or the one ahead
+      if (!(std::fabs(s.t) > Test::t_bound(measure, triangle, ray, constants, s.t)))
+        s.t = Test::near_t(triangle, ray, constants);
+      if (!(s.t > 0)) return;
+    }
+    if (!(s.t >= ray.t_min && s.t < hit.t)) return;
+    hit = {s.t, i, 0, s.u, s.v};
   }
 };
 
@@ -227,6 +237,26 @@ struct Trace {
   }
 };
 
+/// Ray → 1 if anything is hit within its interval, else 0, by any structure.
+template <class Structure>
+struct Occlude {
+  using T = typename Structure::Scalar;
+  Structure structure;
+  std::size_t first;
+  const RayOf<T>* rays;
+  std::uint8_t* occluded;
+
+  TRILHA_HD void operator()(std::size_t i) const {
+    NoProbe probe;
+    occluded[i - first] = structure.occluded(rays[i - first], probe) ? 1 : 0;
+  }
+};
+
+/// What is asked of a ray, and the answer's type: its nearest hit; or whether there is any, 1 or 0.
+enum class Query { closest, occluded };
+template <Query query, class T>
+using QueryAnswer = std::conditional_t<query == Query::closest, HitOf<T>, std::uint8_t>;
+
 /// What the test keeps of `count` triangles, in the order that the loop wants on the stream's backend, where
 /// all arrays lie.
 template <class Test, class T>
@@ -237,6 +267,13 @@ Buffer<T> prepare_triangles(const Stream& stream, Loop loop, const vec3* positio
 template <class Test, class T>
 void trace_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles,
                      const RayOf<T>* rays, HitOf<T>* hits, std::size_t n);
+
+/// Is there any hit with t in [ray.t_min, ray.t_max)? 1 or 0 for each of n rays: in every loop what the
+/// nearest hit's found() is, but a ray is done with its first hit, whichever triangle that is. For shadow
+/// rays.
+template <class Test, class T>
+void occluded_triangles(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles,
+                        const RayOf<T>* rays, std::uint8_t* occluded, std::size_t n);
 
 /// What shading reads of the surface. Null is what the chosen mode does not need.
 struct SurfaceView {

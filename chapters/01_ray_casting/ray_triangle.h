@@ -7,6 +7,9 @@
 // vectors.
 // - may_hit: whether the measure leaves a hit possible.
 // - solve: for the few that it does, the decision, the divisions, t and the barycentrics.
+// - t_bound: how far that t may be from the exact one, cheaply: error_bounds.h has the bound proper, and what
+// is derived there holds here, with fewer terms and rounded up. Rays that start on surfaces ask for it.
+// - near_t: the t of the plane, once more in the wider type, where t may be smaller than its error.
 //
 // All are templated on their scalar, so that the reference in higher precision is the same code. All tests
 // are two-sided and say which side was hit. Barycentric u belongs to vertex b and v to vertex c.
@@ -57,6 +60,52 @@ struct KeepsVertices {
   TRILHA_HD static void prepare(const Vec3<T>& a, const Vec3<T>& b, const Vec3<T>& c, T* out) {
     for (int k = 0; k < 3; ++k) out[k] = a[k], out[3 + k] = b[k], out[6 + k] = c[k];
   }
+
+  /// Of a t that is n·(a − o) / n·d, n = e1×e2, whatever the order of its products; infinite where the
+  /// denominator may be zero.
+  template <class T>
+  TRILHA_HD static T quotient_bound(Numbers<T> triangle, const RayOf<T>& ray, T t) {
+    constexpr T rounded = static_cast<T>(gamma<T>(14));
+    const Vec3<T> a = triangle.vector(0);
+    const Vec3<T> e1 = triangle.vector(3) - a, e2 = triangle.vector(6) - a, s = a - ray.origin;
+    T numerator = 0, denominator = 0;
+    for (int k = 0; k < 3; ++k) {
+      const int l = (k + 1) % 3, m = (k + 2) % 3;
+      const T sizes = std::fabs(e1[l] * e2[m]) + std::fabs(e1[m] * e2[l]);
+      numerator = fma(sizes, std::fabs(s[k]), numerator);
+      denominator = fma(sizes, std::fabs(ray.direction[k]), denominator);
+    }
+    // what products lose to underflow, as in error_bounds.h
+    constexpr T subnormal = std::numeric_limits<T>::denorm_min();
+    const T lost = fma(T(2), sum_of_sizes(e1) + sum_of_sizes(e2), T(3)) * subnormal;
+    const T lost_above = fma(2 * sum_of_sizes(s), subnormal, lost);
+    const T lost_below = fma(2 * sum_of_sizes(ray.direction), subnormal, lost);
+    const T below = fma(rounded, denominator, lost_below);
+    const T left = std::fabs(fused_dot(fused_cross(e1, e2), ray.direction)) - below;
+    return left > 0 ? fma(rounded, numerator, fma(std::fabs(t), below, lost_above)) / left
+                    : std::numeric_limits<T>::infinity();
+  }
+
+  /// n·(a − o) / n·d in the wider type, where differences of floats are exact or nearly so: its sign says on
+  /// which side of the plane the ray starts, unless that is as near as doubles can tell. NaN for a ray in the
+  /// plane.
+  template <class T, class Constants>
+  TRILHA_HD static T near_t(Numbers<T> triangle, const RayOf<T>& ray, const Constants&) {
+    using W = Wider<T>;
+    const Vec3<W> a(triangle.vector(0));
+    const Vec3<W> e1 = Vec3<W>(triangle.vector(3)) - a, e2 = Vec3<W>(triangle.vector(6)) - a;
+    const Vec3<W> n = {difference_of_products(e1.y, e2.z, e1.z, e2.y),
+                       difference_of_products(e1.z, e2.x, e1.x, e2.z),
+                       difference_of_products(e1.x, e2.y, e1.y, e2.x)};
+    const W height = fused_dot(n, a - Vec3<W>(ray.origin));
+    return static_cast<T>(height / fused_dot(n, Vec3<W>(ray.direction)));
+  }
+
+ private:
+  template <class T>
+  TRILHA_HD static T sum_of_sizes(const Vec3<T>& v) {
+    return std::fabs(v.x) + std::fabs(v.y) + std::fabs(v.z);
+  }
 };
 
 /// The plane first, then a change of coordinates: the point where the ray meets the plane, expressed in the
@@ -102,6 +151,12 @@ struct PlaneBarycentric : KeepsVertices {
     s = {m.t, m.u / m.det, m.v / m.det, m.n_dot_d < 0};
     return may_hit(m) && m.det > 0 && m.det <= std::numeric_limits<T>::max();
   }
+
+  template <class T, class Constants>
+  TRILHA_HD static T t_bound(const Measure<T>&, Numbers<T> triangle, const RayOf<T>& ray, const Constants&,
+                             T t) {
+    return quotient_bound(triangle, ray, t);
+  }
 };
 
 /// Möller & Trumbore 1997: Cramer's rule on origin + t·direction = a + u·e1 + v·e2, the divisions postponed.
@@ -138,6 +193,12 @@ struct MollerTrumbore : KeepsVertices {
     const T size = std::fabs(m.det);
     s = {m.t / size, m.u / size, m.v / size, m.det > 0};
     return may_hit(m) && size > 0 && size <= std::numeric_limits<T>::max();
+  }
+
+  template <class T, class Constants>
+  TRILHA_HD static T t_bound(const Measure<T>&, Numbers<T> triangle, const RayOf<T>& ray, const Constants&,
+                             T t) {
+    return quotient_bound(triangle, ray, t);
   }
 };
 
@@ -204,6 +265,28 @@ struct BaldwinWeber {
   TRILHA_HD static bool solve(const Measure<T>& m, const RayOf<T>&, NoRayConstants, Solution<T>& s) {
     s = {m.t, m.u, m.v, m.against > 0};
     return may_hit(m);
+  }
+
+  /// Of (r·o + r₄) / r·d, where the row's numbers are rounded from a wider type. No bound for double, which
+  /// has none here: there the row is as wrong as the normal of a sliver may be.
+  template <class T, class Constants>
+  TRILHA_HD static T t_bound(const Measure<T>& m, Numbers<T> triangle, const RayOf<T>& ray, const Constants&,
+                             T t) {
+    constexpr T rounded = static_cast<T>(gamma<T>(8));
+    T numerator = std::fabs(triangle[11]), denominator = 0;
+    for (int k = 0; k < 3; ++k) {
+      numerator = fma(std::fabs(triangle[8 + k]), std::fabs(ray.origin[k]), numerator);
+      denominator = fma(std::fabs(triangle[8 + k]), std::fabs(ray.direction[k]), denominator);
+    }
+    const T left = std::fabs(m.against) - rounded * denominator;
+    return left > 0 ? rounded * fma(std::fabs(t), denominator, numerator) / left
+                    : std::numeric_limits<T>::infinity();
+  }
+
+  /// NaN: the vertices are no longer there, and the row is no better than its rounding.
+  template <class T, class Constants>
+  TRILHA_HD static T near_t(Numbers<T>, const RayOf<T>&, const Constants&) {
+    return std::numeric_limits<T>::quiet_NaN();
   }
 };
 
@@ -284,6 +367,23 @@ struct Watertight : KeepsVertices {
     const W v = difference_of_products<W>(m.ax, m.cy, m.ay, m.cx);
     const W w = difference_of_products<W>(m.bx, m.ay, m.by, m.ax);
     return finish(m, u, v, w, u + v + w, ray.direction[k.kz], s);
+  }
+
+  /// t is a weighted mean of the vertices' depths: an error in a weight counts by the differences of depth,
+  /// which is also what it can be off at most, and the rest by the depths.
+  template <class T>
+  TRILHA_HD static T t_bound(const Measure<T>& m, Numbers<T>, const RayOf<T>& ray, const Constants<T>& k, T) {
+    constexpr T six = static_cast<T>(gamma<T>(6)), twelve = static_cast<T>(gamma<T>(12));
+    const auto largest = [](T a, T b, T c) { return max(max(std::fabs(a), std::fabs(b)), std::fabs(c)); };
+    const T x = largest(m.ax, m.bx, m.cx), y = largest(m.ay, m.by, m.cy), z = largest(m.az, m.bz, m.cz);
+    const T span = max(max(m.az, m.bz), m.cz) - min(min(m.az, m.bz), m.cz);
+    // an edge function is off by δ = 2(x·δy + y·δx), the vertices by δx = γ(x + 2z) and δy = γ(y + 2z)
+    const T edges =
+        3 * fma(six, largest(m.u, m.v, m.w), 2 * fma(x, six * fma(T(2), z, y), y * (six * fma(T(2), z, x))));
+    const T left = std::fabs(m.u + m.v + m.w) - edges;
+    const T share = left > edges ? edges / left : T(1);
+    return fma(share, span, twelve * z) / std::fabs(ray.direction[k.kz]) +
+           std::numeric_limits<T>::denorm_min();
   }
 
  private:

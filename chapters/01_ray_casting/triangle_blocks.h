@@ -10,8 +10,11 @@ namespace trilha {
 /// Triangles in a block: two AVX2 vectors, or one of AVX-512. Independent vectors hide each other's latency.
 constexpr std::uint32_t block_lanes = 16;
 
-/// The nearest hit of each of n rays among the triangles, whose numbers lie in blocks of `block_lanes`.
-template <class Test, class T>
-void trace_blocks(const Triangles<Test, T>& triangles, const RayOf<T>* rays, HitOf<T>* hits, std::size_t n);
+/// The nearest hit of each of n rays among the triangles, whose numbers lie in blocks of `block_lanes`; or
+/// whether there is any: then a ray that has one meets no further block, and a batch whose rays all have one
+/// no further chunk.
+template <Query query, class Test, class T>
+void trace_blocks(const Triangles<Test, T>& triangles, const RayOf<T>* rays, QueryAnswer<query, T>* answers,
+                  std::size_t n);
 
 }  // namespace trilha

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <vector>
 
+#include "common/app/ordeix_cioli_config.h"
 #include "common/app/words.h"
 #include "common/error.h"
 #include "common/image/files.h"
@@ -94,14 +95,25 @@ class ConfigFile {
  public:
   static constexpr std::size_t most_bytes = 1 << 20, longest_line = 1024;
 
-  /// Gives each option what the file says of it, but for those that the command line says. Throws InputError
-  /// with file, line and name.
-  void read(const std::string& path, CLI::App& app);
+  /// Gives each option what the file says of it, but for those that the command line says. Returns what of
+  /// the file has no use in that chapter, a line each. Throws InputError with file, line and name.
+  std::vector<std::string> read(const std::string& path, CLI::App& app, const std::string& chapter);
 
   /// A refusal that names a flag which this file gave is a refusal of the file: it gets its name and line.
   void check_blame(const std::string& refusal) const;
 
  private:
+  /// Where a flag was said, and, where that was by another name, this one and ": ".
+  struct Place {
+    std::size_t line;
+    std::string key;
+  };
+
+  void read_flags(const std::string& bytes, CLI::App& app);
+  std::vector<std::string> read_ordeix_cioli(const std::string& bytes, CLI::App& app,
+                                             const std::string& chapter);
+  void check_line(std::string_view line) const;
+  void check_length(std::string_view line) const;
   std::vector<std::string> values(const std::string& name, std::string_view text) const;
   std::string quoted(std::string_view& text) const;
   std::string unquoted(std::string_view text) const;
@@ -109,7 +121,8 @@ class ConfigFile {
 
   std::string path_;
   std::size_t line_ = 0;
-  std::map<std::string, std::size_t> lines_;  // of the names that it gave
+  std::string key_;                     // that the line has instead of a flag, and ": "
+  std::map<std::string, Place> lines_;  // of the names that it gave
 };
 
 std::string_view trimmed(std::string_view text) {
@@ -123,21 +136,62 @@ bool ends(std::string_view text) { return text.empty() || text[0] == '#'; }  // 
 
 bool is_control(unsigned char c) { return (c < 32 && c != '\t') || c == 127; }
 
-void ConfigFile::read(const std::string& path, CLI::App& app) {
+std::vector<std::string> ConfigFile::read(const std::string& path, CLI::App& app,
+                                          const std::string& chapter) {
   path_ = path;
-  std::istringstream text(read_bytes(path, most_bytes));
+  const std::string bytes = read_bytes(path, most_bytes);
+  if (is_ordeix_cioli_config(bytes)) return read_ordeix_cioli(bytes, app, chapter);
+  read_flags(bytes, app);
+  return {};
+}
+
+/// Refuses what no line of a text file has.
+void ConfigFile::check_line(std::string_view line) const {
+  if (std::any_of(line.begin(), line.end(), is_control))
+    refuse(path_, line_, "a control character; a text file is wanted, a line each");
+}
+
+std::vector<std::string> ConfigFile::read_ordeix_cioli(const std::string& bytes, CLI::App& app,
+                                                       const std::string& chapter) {
+  std::istringstream text(bytes);
+  for (std::string line; std::getline(text, line);) {
+    ++line_;
+    check_line(trimmed(line));
+    check_length(trimmed(line));
+  }
+  std::vector<std::string> left_out;
+  std::string last;  // key of which a line was said, but for its .X
+  for (const OrdeixCioliStatement& statement : read_ordeix_cioli_config(path_, bytes)) {
+    line_ = statement.line;
+    key_ = statement.key + ": ";
+    const bool here = std::all_of(statement.flags.begin(), statement.flags.end(), [&](const auto& flag) {
+      return app.get_option_no_throw("--" + flag.name) != nullptr;
+    });
+    if (here) {
+      for (const auto& flag : statement.flags) take(flag.name, {flag.value}, app);
+      continue;
+    }
+    const std::string key = statement.key.substr(0, statement.key.find('.'));
+    if (key == std::exchange(last, key)) continue;
+    left_out.push_back(printable(path_) + ":" + std::to_string(line_) + ": " + key + " has no use here" +
+                       (statement.chapter == chapter
+                            ? ""
+                            : "; " + statement.chapter + " takes it as --" + statement.flags.back().name));
+  }
+  key_.clear();
+  return left_out;
+}
+
+void ConfigFile::read_flags(const std::string& bytes, CLI::App& app) {
+  std::istringstream text(bytes);
   std::string whole;
   while (std::getline(text, whole)) {
     ++line_;
     if (line_ == 1 && whole.starts_with("\xef\xbb\xbf")) whole.erase(0, 3);
     const std::string_view line = trimmed(whole);
-    if (std::any_of(line.begin(), line.end(), is_control))
-      refuse(path_, line_, "a control character; a text file is wanted, a line each");
+    check_line(line);
     if (line.empty() || line[0] == '#' || line[0] == ';') continue;
-    if (line.size() > longest_line)
-      refuse(path_, line_,
-             "a line of " + std::to_string(line.size()) + " bytes; " + std::to_string(longest_line) +
-                 " are the most");
+    check_length(line);
     if (line[0] == '[')
       refuse(path_, line_, "sections have no meaning here; write name = value, a line each");
     const std::size_t end = std::min(line.find_first_of("=#"), line.size());
@@ -150,6 +204,13 @@ void ConfigFile::read(const std::string& path, CLI::App& app) {
          alone ? std::vector<std::string>{"true"} : values(std::string(name), trimmed(line.substr(end + 1))),
          app);
   }
+}
+
+void ConfigFile::check_length(std::string_view line) const {
+  if (line.size() > longest_line)
+    refuse(path_, line_,
+           "a line of " + std::to_string(line.size()) + " bytes; " + std::to_string(longest_line) +
+               " are the most");
 }
 
 /// What stands after the '=': one text, or those of a list.
@@ -215,8 +276,9 @@ void ConfigFile::take(const std::string& name, const std::vector<std::string>& v
   const bool flag = option->get_expected_min() == 0;
   const bool many = !flag && option->get_multi_option_policy() == CLI::MultiOptionPolicy::TakeAll;
   if (by_file && !many)
-    refuse(path_, line_,
-           in_quotes(name) + " is said in line " + std::to_string(lines_[key]) + " already; say it once");
+    refuse(
+        path_, line_,
+        in_quotes(name) + " is said in line " + std::to_string(lines_[key].line) + " already; say it once");
   const auto excluded = [&](const CLI::Option* other) {
     return other->count() > 0 && lines_.count(other->get_name()) == 0;
   };
@@ -227,8 +289,8 @@ void ConfigFile::take(const std::string& name, const std::vector<std::string>& v
     if (other->count() > 0)
       refuse(path_, line_,
              in_quotes(name) + " excludes '" + other->get_name().substr(2) + "' in line " +
-                 std::to_string(lines_[other->get_name()]) + "; say one of them");
-  lines_.emplace(key, line_);
+                 std::to_string(lines_[other->get_name()].line) + "; say one of them");
+  lines_.emplace(key, Place{line_, key_});
   try {
     if (flag) {
       static const std::set<std::string> words{"true", "false", "on", "off", "yes", "no", "1", "0"};
@@ -242,18 +304,19 @@ void ConfigFile::take(const std::string& name, const std::vector<std::string>& v
   } catch (const CLI::ParseError&) {
     std::string all;
     for (const std::string& value : values) all += (all.empty() ? "" : ", ") + value;
-    refuse(path_, line_, key + " does not take " + in_quotes(all) + "; --help says what it takes");
+    refuse(path_, line_, key_ + key + " does not take " + in_quotes(all) + "; --help says what it takes");
   } catch (const UsageError& error) {
-    refuse(path_, line_, error.what());
+    refuse(path_, line_, key_ + error.what());
   } catch (const InputError& error) {
-    if (std::string(error.what()).starts_with("--")) refuse(path_, line_, error.what());
+    if (std::string(error.what()).starts_with("--")) refuse(path_, line_, key_ + error.what());
     throw;
   }
 }
 
 void ConfigFile::check_blame(const std::string& refusal) const {
-  for (const auto& [key, line] : lines_)
-    if (refusal.starts_with(key + ":") || refusal.starts_with(key + " ")) refuse(path_, line, refusal);
+  for (const auto& [key, place] : lines_)
+    if (refusal.starts_with(key + ":") || refusal.starts_with(key + " "))
+      refuse(path_, place.line, place.key + refusal);
 }
 
 void print_settings(const Settings& settings) {
@@ -271,7 +334,7 @@ class CommandLine {
 
   CLI::App& app() { return app_; }
   /// What the file says of flags that the command line does not say.
-  void read_file(const std::string& path) { file_.read(path, app_); }
+  void read_file(const std::string& path) { options_.warnings = file_.read(path, app_, demo_.name().first); }
   /// The --config file; empty: none.
   const std::string& config() const { return config_; }
   /// Checks and keeps what was said. A refusal of what the file said is a refusal of the file.
@@ -294,7 +357,9 @@ CommandLine::CommandLine(Demo& demo, Settings& settings, Options& options)
   const std::string program = demo.name().first;
   CLI::App& app = app_;
   app.get_formatter()->column_width(34);
-  app.add_option("--scene", options.scene, "name of a scene (--list-scenes), or a file")
+  const std::string scene = demo.default_scene();
+  app.add_option("--scene", options.scene,
+                 "name of a scene (--list-scenes), or a file" + (scene.empty() ? "" : " [" + scene + "]"))
       ->type_name("NAME|FILE");
   app.add_flag("--allow-paths", options.allow_paths, "scene files may name files outside their folder");
   app.add_option("--view", options.view, "a view of the scene, by its name")->type_name("NAME");
@@ -305,9 +370,13 @@ CommandLine::CommandLine(Demo& demo, Settings& settings, Options& options)
       ->type_name("FILE");
   app.add_option("--size", size_, "of the image, in pixels [640x480; in a window as it fits]")
       ->type_name("WxH");
-  auto* samples = app.add_option("--samples", options.samples,
-                                 "rays a pixel [1; in a window " + std::to_string(window_samples) + "]")
-                      ->type_name("N");
+  const std::optional<int> complete = demo.samples();
+  auto* samples =
+      app.add_option("--samples", options.samples,
+                     complete ? "a pixel [as the settings make it complete: " + std::to_string(*complete) +
+                                    " as they are]"
+                              : "rays a pixel [1; in a window " + std::to_string(window_samples) + "]")
+          ->type_name("N");
   app.add_flag("--jitter", options.jitter,
                "even a single sample goes anywhere in its pixel, not through its centre");
   app.add_option("--time", options.seconds, "add samples until so many seconds have passed")
@@ -326,6 +395,9 @@ CommandLine::CommandLine(Demo& demo, Settings& settings, Options& options)
   app.add_option("--split", options.split, "open the window split; B's settings come from a file of flags")
       ->type_name("FILE")
       ->configurable(false);
+  app.add_option("--reference", options.reference,
+                 "open the window with a reference of so many samples, and tell errors against it")
+      ->type_name("N");
   app.add_flag("--fullscreen", options.fullscreen, "open the window over the whole screen");
   app.add_option("--screenshot", options.screenshot,
                  "draw the window as it is once the image is complete, without a display, to a file")
@@ -375,7 +447,8 @@ void CommandLine::check_parts() const {
       {"--time", options_.seconds > 0}, {"--json", options_.json},
       {"--explain", options_.explain},  {"--sweep", !options_.sweeps.empty()},
   };
-  for (const char* flag : {"--split", "--fullscreen", "--screenshot", "--window-size", "--scale"})
+  for (const char* flag :
+       {"--split", "--reference", "--fullscreen", "--screenshot", "--window-size", "--scale"})
     for (const auto& [other, there] : without_window)
       if (there && app_.get_option(flag)->count() > 0)
         throw UsageError(std::string(flag) + " is about the window, and with " + other +
@@ -417,6 +490,7 @@ void CommandLine::check() {
     require("--fov", *options_.field_of_view, 0.001f, 179.0f);
   }
   if (options_.samples) require("--samples", *options_.samples, 1, most_samples);
+  require("--reference", options_.reference, 0, most_samples);
   require("--time", options_.seconds, 0.0, 1e6);
   require("--threads", options_.threads, 0, 1024);
   require("--report-budget", options_.report_budget, 1.0, 1e6);

@@ -11,13 +11,13 @@ namespace trilha {
 
 /// What every chapter's program can be told, beside the settings of its chapter.
 struct Options {
-  std::string scene;               ///< a name or a file; empty for the default
+  std::string scene;               ///< a name or a file; empty for Demo::default_scene
   bool allow_paths = false;        ///< scene files may name files outside their folder
   std::string view;                ///< one of the scene's; empty for its camera
   std::optional<Backend> backend;  ///< empty: CUDA if it is there
   std::string output;              ///< empty: <chapter>.png in the working directory
   int width = 0, height = 0;       ///< of the image; 0: as the window is, of a file 640×480
-  std::optional<int> samples;      ///< empty: 1 of a file, 1024 in a window
+  std::optional<int> samples;      ///< empty: Demo::samples, else 1 of a file, 1024 in a window
   bool jitter = false;             ///< even a single sample goes anywhere in its pixel
   double seconds = 0;              ///< if above 0, samples are added until they have passed
   std::uint64_t seed = 0;
@@ -32,11 +32,13 @@ struct Options {
   bool headless = false;
   std::string split;  ///< a file of flags: the window opens split, B's settings come from there
   bool fullscreen = false;
-  std::string screenshot;                   ///< the window is drawn without a display, to this PNG; empty: no
+  int reference = 0;       ///< the window begins with a reference of so many samples; 0: with none
+  std::string screenshot;  ///< the window is drawn without a display, to this PNG; empty: no
   int window_width = 0, window_height = 0;  ///< 0: to suit --size, else 1280×720
   float scale = 0;                          ///< of everything in the window; 0: as the screen has it
   bool explain = false, json = false, quiet = false, list_settings = false, list_scenes = false;
-  std::string listed;  ///< the scene or collection that --list-scenes names; empty for all
+  std::string listed;                 ///< the scene or collection that --list-scenes names; empty for all
+  std::vector<std::string> warnings;  ///< what of a --config file has no use here, a line each
 };
 
 /// Reads the command line (and a --config file) into options, settings and the demo's heat map. Returns an
@@ -45,7 +47,9 @@ struct Options {
 /// A --config file holds a flag a line: "name = value", or a name alone for "true". '#' begins a comment, ';'
 /// does at the beginning of a line. What a value would be misread for stands in quotes, '…' or "…", in which
 /// the quote itself is doubled; [a, b] is a list for what may be said more than once. What the command line
-/// says goes first. The file has at most 1 MiB and 1024 bytes a line. What is wrong with it, unknown names as
+/// says goes first. The file has at most 1 MiB and 1024 bytes a line. A file whose first statement has a key
+/// of Ordeix & Cioli's configuration file is read as such (ordeix_cioli_config.h); of what has no use in this
+/// chapter Options::warnings has a line. What is wrong with it, unknown names as
 /// well as wrong values, is an InputError (exit code 1) with file, line and name, for it was read, not typed.
 std::optional<int> read_command_line(int argc, char** argv, Demo& demo, Settings& settings, Options& options);
 
@@ -75,6 +79,11 @@ Backend backend_of(const Options& options);
 
 /// A pixel's samples in a window, unless said, and the most anywhere.
 constexpr int window_samples = 1024, most_samples = 1 << 24;
+
+/// The samples a pixel of a file, where no time is set.
+inline int file_samples(const Options& options, const Demo& demo) {
+  return options.samples.value_or(demo.samples().value_or(1));
+}
 
 /// Does each sample go anywhere in its pixel? Else a pixel's only one goes through its centre.
 inline bool is_jittered(const Options& options, int samples) { return options.jitter || samples > 1; }

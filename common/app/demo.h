@@ -62,8 +62,18 @@ class Demo {
 
   virtual void declare_settings(Settings& settings) = 0;
 
+  /// The scene that is shown where none is named; "": the bunny.
+  virtual std::string default_scene() const { return ""; }
+
   /// The parts of a scene that this chapter reads with its settings as they are: others are not even loaded.
   virtual LoadOptions reads() const { return {}; }
+  /// With how many samples a pixel the settings as they are make the picture complete, such as 16 for a grid
+  /// of 4 × 4; none: with as many as anyone likes. Asked before a build as well. A file then gets so many by
+  /// default, and a window asks for no more; a single one goes through the pixel's centre unless --jitter
+  /// says otherwise. A file's own --samples or --time may still ask for more, with indices beyond that
+  /// number.
+  virtual std::optional<int> samples() const { return {}; }
+
   /// What of the scene this chapter cannot show, a line each.
   virtual std::vector<std::string> not_shown(const Scene& /*scene*/) const { return {}; }
 
@@ -96,6 +106,10 @@ class Demo {
   /// Names that --heatmap takes, and the choice of one.
   virtual std::vector<std::string> heatmaps() const { return {}; }
   virtual void show_heatmap(const std::string& /*measure*/) {}
+
+  /// What the samples since the last of index 0 met and the user should know of, a line each: "12 rays were
+  /// in more than 8 glass bodies at once".
+  virtual std::vector<std::string> remarks() const { return {}; }
 
   /// Milliseconds by stage of all samples since the build; what the sum leaves of the whole is overhead.
   virtual std::vector<std::pair<std::string, double>> stage_times() const { return {}; }

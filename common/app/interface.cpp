@@ -102,7 +102,7 @@ void Interface::draw(int width, int height) {
   session_.update();
   if (session_.generation() != seen_generation_) {
     seen_generation_ = session_.generation();
-    asked_.emplace(seen_generation_, Clock::now());
+    asked_.emplace(seen_generation_, begin);
     wake();
   }
   glViewport(0, 0, width, height);
@@ -113,12 +113,11 @@ void Interface::draw(int width, int height) {
   const auto end = Clock::now();
   if (still_moving_ > 0) --still_moving_;
   if (ImGui::IsAnyItemActive() || ImGui::GetIO().WantTextInput) wake();
-  if (last_frame_ && ms_between(*last_frame_, begin) < 200)
-    remember(times_.frame, ms_between(*last_frame_, begin));
-  last_frame_ = begin;
+  if (last_frame_) remember(times_.frame, ms_between(*last_frame_, begin));
+  last_frame_ = animates() ? std::optional(begin) : std::nullopt;  // else the next one waits for an event
   remember(times_.drawing, ms_between(begin, end));
   if (const auto found = asked_.upper_bound(picture_.generation); found != asked_.begin()) {
-    remember(times_.latency, ms_between(std::prev(found)->second, end));
+    remember(times_.latency, ms_between(asked_.begin()->second, end));  // of what has waited longest
     asked_.erase(asked_.begin(), found);
   }
 }
@@ -129,8 +128,16 @@ bool Interface::complete() const {
   const Activity activity = session_.renderer().activity();
   if (activity.what != "done" || picture_.generation != session_.generation()) return false;
   if (session_.reference_samples() > 0 && !activity.reference_ready) return false;
-  for (const auto& frame : picture_.sides)
+  for (std::size_t i = 0; i < picture_.sides.size(); ++i) {
+    const auto& frame = picture_.sides[i];
     if (!frame || !frame->complete) return false;
+    const Figures figures = session_.renderer().figures(static_cast<int>(i));
+    if (frame->display.heatmap
+            ? figures.histogram.empty()
+            : session_.reference_samples() > 0 &&
+                  (figures.errors.empty() || figures.errors.back().samples < frame->samples))
+      return false;
+  }
   return !session_.difference_shown() || difference_shown_ != nullptr;
 }
 
@@ -146,7 +153,10 @@ void Interface::layout() {
   image_ = {0, clean_ ? 0 : static_cast<int>(bar), std::max(1, width_ - static_cast<int>(beside)),
             std::max(1, height_ - (clean_ ? 0 : static_cast<int>(bar)))};
   session_.set_size(image_.width, image_.height);
+  side_ = std::min(side_, session_.side_count() - 1);
   handle_keys();
+  session_.update();  // what is drawn from here on speaks of what is wanted now
+  check_pixel();
   viewport();
   if (clean_) return;
   top_bar();
@@ -182,6 +192,7 @@ void Interface::handle_keys() {
   if (pressed(keys::home)) session_.reset_camera();
   if (flying_) return fly();
   if (pressed('S')) session_.split(!session_.is_split());
+  side_ = std::min(side_, session_.side_count() - 1);
   if (pressed('X') && session_.is_split()) session_.swap_sides();
   if (pressed('D') && session_.is_split()) session_.show_difference(!session_.difference_shown());
   if (pressed('R')) session_.make_reference(session_.reference_samples() > 0 ? 0 : reference_samples_);
@@ -278,16 +289,17 @@ void Interface::top_bar() {
   const float room = static_cast<float>(width_) - ImGui::GetItemRectMax().x - units(24);
   const float wide = std::min(units(300), room);
   if (wide > units(80)) {
-    const float text = std::min(wide, ImGui::CalcTextSize(what.c_str()).x);
-    ImGui::SameLine(static_cast<float>(width_) - std::max(text, units(120)) - units(12));
+    const float text = std::max(units(120), ImGui::CalcTextSize(what.c_str()).x),
+                shown = std::min(wide, text);
+    ImGui::SameLine(static_cast<float>(width_) - shown - units(12));
     const ImVec2 at = ImGui::GetCursorScreenPos();
     const float height = ImGui::GetFrameHeight();
     ImDrawList* draw = ImGui::GetWindowDrawList();
     if (activity.fraction > 0 && activity.fraction < 1 && session_.opening().empty())
       draw->AddRectFilled({at.x, at.y + height - units(3)},
-                          {at.x + wide * static_cast<float>(activity.fraction), at.y + height},
+                          {at.x + shown * static_cast<float>(activity.fraction), at.y + height},
                           ImGui::GetColorU32(ImGuiCol_PlotHistogram), units(1));
-    ImGui::PushClipRect(at, {at.x + wide, at.y + height}, true);
+    ImGui::PushClipRect(at, {at.x + shown, at.y + height}, true);
     ImGui::AlignTextToFramePadding();
     ImGui::TextUnformatted(what.c_str());
     ImGui::PopClipRect();
@@ -297,7 +309,14 @@ void Interface::top_bar() {
 }
 
 void Interface::scene_menu() {
-  if (scenes_.empty()) scenes_ = scene_table();
+  if (ImGui::IsWindowAppearing()) {  // one may have been fetched since
+    try {
+      scenes_ = scene_table();
+    } catch (const InputError& error) {
+      scenes_.clear();
+      session_.notify(error.what(), true);
+    }
+  }
   ImGui::TextUnformatted("A name with parameters (hall:detail=4), or a file");
   ImGui::SetNextItemWidth(units(380));
   const bool entered =

@@ -108,12 +108,16 @@ class Interface {
   void show_picture(const Picture& picture);
   void side_label(int side);
   void divider();
-  void difference();
+  void difference(const Comparison& comparison);
+  void why_no_difference();
   void lines_over_image();
   void pixel_card();
   void move_camera();
   void fly();
   void click(int x, int y);
+  void ask(int side, const Camera& camera, int width, int height, int x, int y, bool focus);
+  void check_pixel();
+  bool is_before(int side) const;
   std::string what_differs(int side, const Frame& frame, const Frame* other) const;
   float units(float design) const { return design * scale_; }
 
@@ -141,15 +145,19 @@ class Interface {
 
   /// What was clicked; shared with the render thread's answer.
   struct Pixel {
-    std::mutex mutex;
-    int x = 0, y = 0, side = 0;
+    int x = 0, y = 0, side = 0, width = 0, height = 0;
+    Camera camera;       ///< of the picture that was clicked
+    const Scene* scene;  ///< that it is of, as the wish had it: to be compared, not looked into
+    Wanted::Side of;     ///< the same of its side
+    std::mutex mutex;    ///< of the rest
     bool answered = false;
     bool focus = false;  ///< look there once it is known
     Inspection inspection;
   };
+  bool in_view_of(const Pixel& pixel) const;
   std::shared_ptr<Pixel> pixel_;
 
-  std::vector<SceneEntry> scenes_;  ///< read when the menu opens first
+  std::vector<SceneEntry> scenes_;  ///< as they were when the menu opened
   WindowTimes times_;
   std::optional<Clock::time_point> last_frame_;
   std::uint64_t seen_generation_ = 0;

@@ -50,7 +50,6 @@ void Interface::panel() {
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {units(8), units(4)});
   ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, {units(4), units(1.5f)});
   ImGui::PushAllowKeyboardFocus(false);  // Tab goes to the other side, not to the next slider
-  side_ = std::min(side_, session_.side_count() - 1);
   if (session_.is_split()) side_tabs();
   settings_of(side_);
   figures();
@@ -223,6 +222,10 @@ void Interface::settings_of(int side) {
         ImGui::SetTooltip(
             "--samples: one goes through the pixel's centre, more go anywhere in it.\n"
             "Ctrl-click to type.");
+      if (const auto complete = own.demo->samples())
+        ImGui::TextDisabled("%s", (counted(static_cast<std::uint64_t>(*complete), "sample") +
+                                   (*complete == 1 ? " completes" : " complete") + " the picture")
+                                      .c_str());
       ImGui::EndTable();
     }
     std::string group;
@@ -301,7 +304,8 @@ void Interface::figure_rows() {
     for (int i = 0; i < 2; ++i) cell(side_names[i], side_colours[i]);
   }
   row("build", [](const Figures& f) { return duration(f.build_ms); });
-  row("a sample", [](const Figures& f) { return f.samples > 0 ? duration(f.sample_ms) : std::string("–"); });
+  row("a sample",
+      [](const Figures& f) { return f.samples > 0 ? duration(f.render_ms / f.samples) : std::string("–"); });
   for (std::size_t k = 0; k < of[0].stage_ms.size(); ++k)
     row("   " + of[0].stage_ms[k].first, [k](const Figures& f) {
       return k < f.stage_ms.size() && f.samples > 0 ? duration(f.stage_ms[k].second / f.samples)
@@ -311,7 +315,8 @@ void Interface::figure_rows() {
     return f.mrays_per_s > 0 ? formatted("%.3g", f.mrays_per_s) : std::string("–");
   });
   row("samples", [](const Figures& f) { return std::to_string(f.samples); });
-  row("all samples", [](const Figures& f) { return duration(f.render_ms); });
+  row("all samples",
+      [](const Figures& f) { return f.samples > 0 ? duration(f.render_ms) : std::string("–"); });
   if (!of[0].errors.empty() || !of[1].errors.empty())
     row("RMSE", [](const Figures& f) {
       return f.errors.empty() ? std::string("–") : formatted("%.3e", f.errors.back().rmse);
@@ -418,6 +423,11 @@ void Interface::error_section() {
   }
   log_log_plot("errors", {-1, units(200)}, "render time (ms)", "RMSE", curves, activity.reference_floor,
                "the reference's own");
+  for (int i = 0; i < session_.side_count(); ++i)
+    if (const std::string other = session_.renderer().figures(i).reference_differs; !other.empty())
+      ImGui::TextWrapped("%sthe reference has %s: what differs by that is in the error.",
+                         session_.is_split() ? (std::string(side_names[i]) + ": ").c_str() : "",
+                         other.c_str());
 }
 
 }  // namespace trilha

@@ -40,14 +40,15 @@ struct Outcome {
   std::size_t bytes = 0;  ///< that the buffers of the backend held at most
   int samples = 0;        ///< complete ones
   bool stopped = false;
+  std::vector<std::string> remarks;
   std::vector<std::pair<std::string, double>> stage_ms;
 
   double mrays_per_s() const { return render_ms > 0 ? rays / render_ms / 1e3 : 0; }
 };
 
-Scene load(const Options& options, LoadOptions how) {
+Scene load(const Demo& demo, const Options& options, LoadOptions how) {
   how.allow_paths = options.allow_paths;
-  Scene scene = load_scene(options.scene, how);
+  Scene scene = load_scene(options.scene.empty() ? demo.default_scene() : options.scene, how);
   scene.camera = camera_of(scene, options, double(options.width) / options.height);
   return scene;
 }
@@ -55,7 +56,7 @@ Scene load(const Options& options, LoadOptions how) {
 void render(Demo& demo, const Scene& scene, const Stream& stream, const Options& options, Film& film,
             Outcome& outcome) {
   const bool timed = options.seconds > 0;
-  const int most = timed ? 1 << 24 : options.samples.value_or(1);
+  const int most = timed ? 1 << 24 : file_samples(options, demo);
   Progress progress("rendering", timed ? options.seconds : most, options.quiet || options.json);
   if (timed) progress.stop_after(options.seconds);
   const auto start = Clock::now();
@@ -80,6 +81,7 @@ void render(Demo& demo, const Scene& scene, const Stream& stream, const Options&
   stream.synchronize();
   outcome.render_ms = milliseconds_since(start);
   outcome.rays = demo.rays();
+  outcome.remarks = demo.remarks();
   outcome.stage_ms = demo.stage_times();
   outcome.bytes = peak_bytes(stream.backend());
 }
@@ -195,10 +197,10 @@ void run_report(Demo& demo, const Settings& settings, const Options& options,
     for (const std::string& text : options.sweeps) sweeps.push_back(Sweep::parse(text, settings));
     if (sweeps.size() == 2 && sweeps[0].name == sweeps[1].name)
       throw UsageError("--sweep: " + sweeps[0].name + " is named twice; give its values in one list");
-    const Scene scene = load(options, {});  // whatever a value of the settings may read
+    const Scene scene = load(demo, options, {});  // whatever a value of the settings may read
     for (const std::string& warning : scene.warnings) warn(warning);
     report.run({sweep_experiment(sweeps, settings, scene, backend_of(options), options.width, options.height,
-                                 options.samples.value_or(1), make_demo)});
+                                 options.samples, make_demo)});
   }
   for (const std::string& what : report.left_out()) warn("not in the report: " + what);
   if (!options.report.empty()) report.write(options.report);
@@ -256,6 +258,7 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   Demo& demo = *made;
   demo.declare_settings(settings);
   if (const auto done = read_command_line(argc, argv, demo, settings, options)) return *done;
+  for (const std::string& warning : options.warnings) warn(warning);
   if (options.list_scenes) {
     if (options.json)
       std::cout << scenes_as_json(options.listed);
@@ -294,7 +297,7 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
   check_can_write(options.output);
   const Stream stream = backend_of(options);
   const auto start = Clock::now();
-  const Scene scene = load(options, demo.reads());
+  const Scene scene = load(demo, options, demo.reads());
   const double load_ms = milliseconds_since(start);
   for (const std::string& warning : scene.warnings) warn(warning);
   for (const std::string& warning : demo.not_shown(scene)) warn(warning);
@@ -315,7 +318,7 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
     std::cerr << "no window: " << no_window << "; rendered to " << options.output << " (--headless)\n";
   if (options.explain) {
     if (scene.images_not_read > 0)
-      measure_loading([&](bool all) { return load(options, all ? LoadOptions{} : demo.reads()); },
+      measure_loading([&](bool all) { return load(demo, options, all ? LoadOptions{} : demo.reads()); },
                       interrupted, savings.front());
     measure(demo, scene, stream,
             {scene.camera, options.width, options.height, options.jitter, options.seed, band_ms,
@@ -326,6 +329,7 @@ int run(int argc, char** argv, const std::function<std::unique_ptr<Demo>()>& mak
     print_json(demo, settings, scene, stream, options, outcome, savings);
   else if (!options.quiet)
     print_text(scene, stream, options, outcome, savings);
+  for (const std::string& remark : outcome.remarks) warn(remark);
   if (outcome.samples == 0 && !outcome.stopped)
     warn("--time was too short for one sample a pixel: the image holds what was done by then");
   if (outcome.stopped) warn("stopped by request: the image holds what was done by then");

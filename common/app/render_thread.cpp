@@ -61,6 +61,11 @@ bool swapped(const Wanted& from, const Wanted& to) {
          from.sides[0] == to.sides[1] && from.sides[1] == to.sides[0];
 }
 
+/// The samples a pixel that are wanted of a side at the end.
+int samples_of(const Wanted& wanted, const Wanted::Side& side) {
+  return side.most_samples > 0 ? std::min(wanted.samples, side.most_samples) : wanted.samples;
+}
+
 /// 1, 2, 3, 4, 6, 8, 11, 16, …: the numbers of samples at which errors are measured, a factor √2 apart.
 bool is_curve_point(int samples) {
   const double k = std::round(2 * std::log2(samples));
@@ -134,6 +139,7 @@ struct Side {
   double publish_ms = 0;
 
   std::ptrdiff_t structure_bytes = 0, working_bytes = 0, own_bytes = 0;
+  std::vector<std::string> remarks;
   std::vector<Saving> left_out;
 
   Side() = default;
@@ -144,7 +150,8 @@ struct Side {
 
 /// An image that errors are told against, in two halves of other random numbers than the sides have.
 struct Reference {
-  Wanted wanted;                                                         ///< when it was begun
+  Wanted wanted;      ///< when it was begun
+  Wanted::Side side;  ///< A's settings, of which it is made
   std::unique_ptr<Technique> technique = std::make_unique<Technique>();  ///< null at the end
   std::uint64_t seeds[2];
   Exposure halves[2];
@@ -311,7 +318,8 @@ struct RenderThread::State {
     enum class Kind { inspect, image, savings };
     Kind kind;
     int side;
-    int x, y;
+    Camera camera;  ///< of the picture that was looked at, as the size is
+    int width, height, x, y;
     std::function<void(const Inspection&)> inspected;
     std::function<void(const Image&, int, const std::string&)> imaged;
     std::uint64_t generation;
@@ -363,6 +371,7 @@ struct RenderThread::State {
   int overlay_level = -1;
   std::uint64_t overlay_build = 0;
   std::uint64_t comparable = 0;
+  bool warm[2] = {};  ///< has that backend built anything?
   struct Compared {
     std::uint64_t comparable = 0;
     int samples = 0;
@@ -385,7 +394,8 @@ struct RenderThread::State {
     const Wanted::Side &before = from.sides[i], &after = to.sides[j];
     if (before.backend != after.backend) return Effect::rebuild;
     const Effect effect = declared.difference(before.settings, after.settings);
-    const bool restart = !same_view(from, to) || from.seed != to.seed || from.jittered != to.jittered;
+    const bool restart = !same_view(from, to) || from.seed != to.seed ||
+                         (from.jittered && !before.centred) != (to.jittered && !after.centred);
     return restart ? std::max(effect, Effect::restart) : effect;
   }
 
@@ -407,7 +417,8 @@ struct RenderThread::State {
       case Job::Kind::build:
         return effect_on(own, from, to) == Effect::rebuild;
       case Job::Kind::render:
-        return restarts(own) || job.samples > to.samples || (job.interruptible && another);
+        return restarts(own) || job.samples > samples_of(to, to.sides[swapped(from, to) ? 1 - own : own]) ||
+               (job.interruptible && another);
       case Job::Kind::compare:
         return another;
       default:
@@ -553,6 +564,10 @@ struct RenderThread::State {
         lock.unlock();
         serve_requests(&job);
         lock.lock();
+      } else if (newest.on_hold() && newest.generation != now.generation) {
+        // it is to be followed, even so: at once where nothing is lost by it, else once this sample is
+        // complete
+        return !job.interruptible;
       } else if (newest.on_hold()) {
         lock.unlock();
         say("paused", 0, true);
@@ -606,7 +621,7 @@ struct RenderThread::State {
         other_looks = true;
         side.look = ++numbers;
         restart(side, true);
-      } else if (side.full.samples > to.samples) {
+      } else if (side.full.samples > samples_of(to, to.sides[i])) {
         restart(side, false);
         side.frame_look = 0;  // what it shows goes on being shown, but is not what is wanted
       }
@@ -619,7 +634,6 @@ struct RenderThread::State {
     }
     if (other_looks) forget_comparison();
     check_reference();
-    drop_requests(effects);
     for (std::size_t i = 0; i < sides.size(); ++i) post_figures(i);
     post_picture();
     board->say_changed();
@@ -629,6 +643,7 @@ struct RenderThread::State {
   /// something else.
   void restart(Side& side, bool coarsely) {
     side.run = ++numbers;
+    side.remarks.clear();
     side.full.begun = false;
     side.full.samples = 0;
     side.coarsely = coarsely;
@@ -676,7 +691,7 @@ struct RenderThread::State {
       if (is_well(*sides[i]) && is_out_of_date(*sides[i])) return publish_again(i), Next{true};
     if (work_on_reference()) return {true};
     for (std::size_t i = 0; i < sides.size(); ++i)
-      if (is_well(*sides[i]) && sides[i]->full.samples < wanted.samples &&
+      if (is_well(*sides[i]) && sides[i]->full.samples < wanted_of(*sides[i]) &&
           (!next || sides[i]->full.samples < sides[*next]->full.samples))
         next = i;
     if (compare_if_due()) return {true};
@@ -694,7 +709,7 @@ struct RenderThread::State {
     for (const auto& side : sides)
       metered(*side, [&] {
         side->frames->trim(1);
-        if (side->full.samples >= now.wanted.samples) side->full.backup.reset();
+        if (side->full.samples >= wanted_of(*side)) side->full.backup.reset();
       });
   }
 
@@ -752,6 +767,9 @@ struct RenderThread::State {
 
   // ---- a side ------------------------------------------------------------------
 
+  /// The samples a pixel that it has at the end.
+  int wanted_of(const Side& side) const { return samples_of(now.wanted, side.technique.side); }
+
   std::string called(std::size_t i) const { return sides.size() < 2 ? "" : i == 0 ? " A" : " B"; }
 
   void prepare(Technique& technique, const Wanted::Side& side) {
@@ -775,8 +793,12 @@ struct RenderThread::State {
       const std::shared_ptr<const Scene> before = std::exchange(technique.scene, now.wanted.scene);
       Job job{Job::Kind::build, static_cast<int>(i)};
       double ms = 0;
-      const bool done =
-          run_job(job, [&] { ms = timed_build(*technique.demo, *technique.scene, *technique.stream); });
+      const bool done = run_job(job, [&] {
+        ms = timed_build(*technique.demo, *technique.scene, *technique.stream);
+        // a machine's first build has what it does once, such as loading its code, in its time
+        if (!std::exchange(warm[side.technique.side.backend == Backend::cuda], true) && ms < soon_ms * 5)
+          ms = timed_build(*technique.demo, *technique.scene, *technique.stream);
+      });
       side.structure_bytes = foreign_bytes(side) - others;
       side.working_bytes = 0;
       if (!done) return;
@@ -920,7 +942,7 @@ struct RenderThread::State {
       const auto between = [&](double fraction, double spent) {
         say("rendering", progress(fraction), false);
         if (side.full.samples > 0) return true;
-        if (side.level > 0) {
+        if (side.coarsely && side.level > 0) {
           if (milliseconds(side.published_at) > std::max(partial_frame_ms, frame_share * side.publish_ms) &&
               fraction < 1)
             publish(side, *side.full.film, &*side.coarse, 0, 1 << side.level);
@@ -934,7 +956,7 @@ struct RenderThread::State {
         metered(side, [&] { make_ready(side.full, *side.technique.stream, back_up); });
         begun = true;
         finished = render_sample(side, job, *side.full.film, static_cast<std::uint32_t>(side.full.samples),
-                                 now.wanted.jittered, ms, between);
+                                 now.wanted.jittered && !side.technique.side.centred, ms, between);
       });
       if (!done || !finished) {
         if (begun && back_up)
@@ -949,12 +971,13 @@ struct RenderThread::State {
       side.render_ms += ms;
       side.sample_ms = ms;
       side.rays += side.technique.demo->rays() - rays;
+      side.remarks = side.technique.demo->remarks();
       add_stages(side, stages);
       side.ms_per_pixel = ms / pixels;
       side.unpublished = true;
       post_figures(i);
       const double since = milliseconds(side.published_at);
-      if (side.full.samples >= now.wanted.samples || ms > frame_ms ||
+      if (side.full.samples >= wanted_of(side) || ms > frame_ms ||
           since > std::max(frame_ms, frame_share * side.publish_ms))
         publish_again(i);
       measure_sample(i);
@@ -973,7 +996,7 @@ struct RenderThread::State {
 
   double progress(double fraction) const {
     double done = fraction, all = 0;
-    for (const auto& side : sides) done += side->full.samples, all += now.wanted.samples;
+    for (const auto& side : sides) done += side->full.samples, all += wanted_of(*side);
     return std::min(1.0, done / std::max(all, 1.0));
   }
 
@@ -1002,7 +1025,7 @@ struct RenderThread::State {
     frame->generation = now.generation;
     frame->samples = samples;
     frame->shrink = shrink;
-    frame->complete = samples >= now.wanted.samples;
+    frame->complete = samples >= wanted_of(side);
     frame->side = side.technique.side;
     frame->display = side.technique.demo->display();
     frame->camera = now.wanted.camera;
@@ -1035,7 +1058,7 @@ struct RenderThread::State {
   bool is_out_of_date(const Side& side) const {
     if (!side.frame || side.frame_look != side.look || side.full.samples == 0) return false;
     return side.frame->side != side.technique.side ||
-           side.frame->complete != (side.frame->samples >= now.wanted.samples);
+           side.frame->complete != (side.frame->samples >= wanted_of(side));
   }
 
   /// The picture, once every side has a frame of this view.
@@ -1075,6 +1098,7 @@ struct RenderThread::State {
                        {"structure", size(side.structure_bytes)},
                        {"rays and hits", size(side.working_bytes)},
                        {"films and frames", size(side.own_bytes)}};
+    figures.remarks = side.remarks;
     figures.left_out = side.left_out;
     figures.overlay_levels = side.overlay_levels;
     figures.failure = side.failure;
@@ -1083,6 +1107,7 @@ struct RenderThread::State {
     Board::Side& shown = board->sides[i];
     if (shown.run == side.run) {
       figures.errors = std::move(shown.figures.errors);
+      figures.reference_differs = std::move(shown.figures.reference_differs);
       figures.histogram = std::move(shown.figures.histogram);
     }
     shown.run = side.run;
@@ -1149,7 +1174,7 @@ struct RenderThread::State {
   void measure_sample(std::size_t i) {
     Side& side = *sides[i];
     const int samples = side.full.samples;
-    if (!is_curve_point(samples) && samples < now.wanted.samples) return;
+    if (!is_curve_point(samples) && samples < wanted_of(side)) return;
     const Display display = side.technique.demo->display();
     const bool tells_error = reference && reference->complete && !display.heatmap;
     if (!display.heatmap && !tells_error) return;
@@ -1169,10 +1194,14 @@ struct RenderThread::State {
         board->say_changed();
       });
     const auto tell_error = [board = board, film, display, run, truth = reference->truth, samples,
-                             ms = side.render_ms] {
+                             ms = side.render_ms, other = differences_from_reference(side)] {
       if (truth->image.pixels.empty()) return;  // it has failed, which was said
       const double error = rmse(developed(*film, display, Backend::cpu), truth->image).value;
-      board->change_figures(run, [&](Figures& figures) { figures.errors.push_back({samples, ms, error}); });
+      board->change_figures(run, [&](Figures& figures) {
+        if (board->truth != truth) return;  // that reference is gone, and its curve with it
+        figures.errors.push_back({samples, ms, error});
+        figures.reference_differs = other;
+      });
       board->say_changed();
     };
     measure_beside(key, most_waiting(), tell_error);
@@ -1192,9 +1221,13 @@ struct RenderThread::State {
   bool compare_if_due() {
     if (!now.wanted.difference || sides.size() != 2) return false;
     Side &a = *sides[0], &b = *sides[1];
-    const int samples = std::min(a.full.samples, b.full.samples);
-    if (!a.failure.empty() || !b.failure.empty() || samples == 0) return false;
-    const bool complete = samples >= now.wanted.samples;
+    if (!a.failure.empty() || !b.failure.empty() || a.full.samples == 0 || b.full.samples == 0) return false;
+    // one that is complete waits for the other
+    const bool a_complete = a.full.samples >= wanted_of(a), b_complete = b.full.samples >= wanted_of(b);
+    const bool complete = a_complete && b_complete;
+    const int samples = a_complete   ? b.full.samples
+                        : b_complete ? a.full.samples
+                                     : std::min(a.full.samples, b.full.samples);
     const Compared next{comparable, samples, complete};
     if (next == compared) return false;
     if (!is_curve_point(samples) && !complete && compared.comparable == comparable) return false;
@@ -1220,7 +1253,7 @@ struct RenderThread::State {
     comparison.generation = now.generation;
     constexpr int key = 2;
     const auto compare = [this, film_a = films[0], film_b = films[1], display_a = displays[0],
-                          display_b = displays[1], comparison, of = comparable]() mutable {
+                          display_b = displays[1], comparison, complete, of = comparable]() mutable {
       const auto image_a = std::make_shared<const Image>(developed(*film_a, display_a, Backend::cpu));
       const auto image_b = std::make_shared<const Image>(developed(*film_b, display_b, Backend::cpu));
       comparison.measures = {{"rmse", rmse(*image_a, *image_b).value},
@@ -1230,7 +1263,7 @@ struct RenderThread::State {
       comparison.image = std::make_shared<const Image>(std::move(difference.image));
       comparison.scale = difference.scale;
       show(board, comparison, of);
-      if (comparison.samples[0] != comparison.samples[1]) return;
+      if (comparison.samples[0] != comparison.samples[1] && !complete) return;
       measuring_slowly->post(key, 1, [board = board, image_a, image_b, comparison, of]() mutable {
         comparison.measures.emplace_back("ssim", ssim(*image_a, *image_b));
         show(board, comparison, of);
@@ -1301,7 +1334,8 @@ struct RenderThread::State {
   void drop_reference() {
     reference.reset();
     for (const auto& side : sides)
-      board->change_figures(side->run, [](Figures& figures) { figures.errors.clear(); });
+      board->change_figures(
+          side->run, [](Figures& figures) { figures.errors.clear(), figures.reference_differs.clear(); });
     const std::lock_guard lock(board->mutex);
     board->activity.reference_samples = 0;
     board->activity.reference_ready = false;
@@ -1313,6 +1347,7 @@ struct RenderThread::State {
   void begin_reference(std::unique_ptr<Technique> technique) {
     reference = std::make_unique<Reference>();
     reference->wanted = now.wanted;
+    reference->side = now.wanted.sides[0];
     reference->technique = std::move(technique);
     // far from the seeds that people take, which are small, and from their neighbours
     reference->seeds[0] = now.wanted.seed ^ std::uint64_t{1} << 63;
@@ -1321,16 +1356,51 @@ struct RenderThread::State {
     board->truth = reference->truth;
   }
 
+  /// What the settings become that a reference of them is made with.
+  std::vector<std::string> exact(const std::vector<std::string>& texts) const {
+    const auto demo = make_demo();
+    Settings settings;
+    demo->declare_settings(settings);
+    settings.set_texts(texts);
+    demo->make_exact();
+    return settings.texts();
+  }
+
+  /// The settings of the reference in which the side, made as exact, would be another: it may be of another
+  /// picture then, and the error is no error of the side's technique. Empty: there are none.
+  std::string differences_from_reference(const Side& side) const {
+    const auto own = exact(side.technique.side.settings), made = exact(reference->side.settings);
+    std::string text;
+    for (std::size_t i = 0; i < own.size(); ++i)
+      if (const Setting& setting = declared.all()[i]; own[i] != made[i] && setting.effect != Effect::none)
+        text += (text.empty() ? "" : ", ") + setting.in_words(made[i]);
+    return text;
+  }
+
+  /// Says why the reference that is wanted is not being made; empty if it is.
+  void post_why_no_reference(const std::string& why) {
+    {
+      const std::lock_guard lock(board->mutex);
+      if (std::exchange(board->activity.reference_failure, why) == why) return;
+    }
+    board->say_changed();
+  }
+
   /// Does the next piece of work on the reference; false if there is none.
   bool work_on_reference() {
     check_reference();
     const Wanted& wanted = now.wanted;
     const Side& a = *sides[0];
-    if (wanted.reference_samples <= 0 || !a.failure.empty() || !a.technique.built) return false;
-    if (a.technique.demo->display().heatmap) return false;
+    if (wanted.reference_samples <= 0) return post_why_no_reference(""), false;
+    if (reference && (reference->complete || !reference->failure.empty())) return false;
+    const bool built = a.failure.empty() && a.technique.built;
+    const std::string why_not = !built                                ? "there is none while A has no picture"
+                                : a.technique.demo->display().heatmap ? "of a heat map there is none"
+                                                                      : "";
+    post_why_no_reference(why_not);
+    if (!why_not.empty()) return false;
     if (!reference) begin_reference(std::make_unique<Technique>());
-    if (reference->complete || !reference->failure.empty()) return false;
-    const int half = (wanted.reference_samples + 1) / 2;
+    const int half = half_of_reference(wanted);
     say("reference", double(reference->samples()) / (2 * half), false);
     try {
       if (!reference->technique->built)
@@ -1350,6 +1420,13 @@ struct RenderThread::State {
       board->say_changed();
     }
     return true;
+  }
+
+  /// The samples of each half: no more than complete the picture, where the exact settings do that.
+  int half_of_reference(const Wanted& wanted) const {
+    const int half = (wanted.reference_samples + 1) / 2;
+    const Technique* technique = reference->technique.get();
+    return technique && technique->built ? std::min(half, technique->demo->samples().value_or(half)) : half;
   }
 
   void build_reference() {
@@ -1374,8 +1451,8 @@ struct RenderThread::State {
       begun = true;
       const Camera camera = now.wanted.camera;
       finished = technique.demo->add_sample(
-          *half.film, {camera, static_cast<std::uint32_t>(half.samples), true, reference->seeds[which],
-                       band_ms, [&](double) { return go_on(job); }});
+          *half.film, {camera, static_cast<std::uint32_t>(half.samples), technique.demo->samples() != 1,
+                       reference->seeds[which], band_ms, [&](double) { return go_on(job); }});
       technique.stream->synchronize();
     });
     if (done && finished) {
@@ -1430,23 +1507,6 @@ struct RenderThread::State {
 
   // ---- requests ---------------------------------------------------------------------
 
-  /// Drops what was asked of pictures that are no more wanted.
-  void drop_requests(const std::vector<Effect>& effects) {
-    std::deque<std::shared_ptr<const Request>> dropped;  // after the lock is open again
-    const std::lock_guard lock(inbox);
-    for (std::size_t k = 0; k < requests.size();) {
-      const Request& one = *requests[k];
-      const auto side = static_cast<std::size_t>(one.side);
-      if (one.kind == Request::Kind::inspect && one.generation < now.generation &&
-          (side >= effects.size() || effects[side] >= Effect::restart)) {
-        dropped.push_back(requests[k]);
-        requests.erase(requests.begin() + static_cast<std::ptrdiff_t>(k));
-      } else {
-        ++k;
-      }
-    }
-  }
-
   /// Answers what can be answered. `during`: the job between whose bands this is, or null.
   void serve_requests(Job* during) {
     for (std::size_t k = 0;;) {
@@ -1473,18 +1533,23 @@ struct RenderThread::State {
       answer_image(one, side);
       return true;
     }
-    if (!side || !side->failure.empty()) return true;
-    if (!side->technique.built) return false;
+    const bool tries = side && (side->failure.empty() ? !side->technique.built : side->retry);
+    if (tries && (during || !now.on_hold())) return false;
+    const std::string why_not = !side                    ? "there is no such side"
+                                : !side->failure.empty() ? side->failure
+                                : tries                  ? "it is paused, and was not built before"
+                                                         : "";
     if (one.kind == Request::Kind::savings) {
+      if (!why_not.empty()) return true;
       if (during || side->full.samples == 0) return false;
       measure_savings(static_cast<std::size_t>(one.side));
       return true;
     }
-    Inspection inspection;
+    Inspection inspection{{{"not known", why_not}}, {}, {}};
+    if (!why_not.empty()) return one.inspected(inspection), true;
     bool done = true;
-    const Wanted& wanted = now.wanted;
     const auto work = [&] {
-      inspection = side->technique.demo->inspect(wanted.camera, wanted.width, wanted.height, one.x, one.y);
+      inspection = side->technique.demo->inspect(one.camera, one.width, one.height, one.x, one.y);
     };
     try {
       if (during) {
@@ -1593,16 +1658,17 @@ std::vector<Line> RenderThread::overlay() const {
   return state_->board->overlay;
 }
 
-void RenderThread::inspect(int side, int x, int y, std::function<void(const Inspection&)> done) {
-  state_->request({State::Request::Kind::inspect, side, x, y, std::move(done), {}, 0});
+void RenderThread::inspect(int side, const Camera& camera, int width, int height, int x, int y,
+                           std::function<void(const Inspection&)> done) {
+  state_->request({State::Request::Kind::inspect, side, camera, width, height, x, y, std::move(done), {}, 0});
 }
 
 void RenderThread::image(int side, std::function<void(const Image&, int, const std::string&)> done) {
-  state_->request({State::Request::Kind::image, side, 0, 0, {}, std::move(done), 0});
+  state_->request({State::Request::Kind::image, side, {}, 0, 0, 0, 0, {}, std::move(done), 0});
 }
 
 void RenderThread::measure_omissions(int side) {
-  state_->request({State::Request::Kind::savings, side, 0, 0, {}, {}, 0});
+  state_->request({State::Request::Kind::savings, side, {}, 0, 0, 0, 0, {}, {}, 0});
 }
 
 }  // namespace trilha

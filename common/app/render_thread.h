@@ -21,6 +21,9 @@ struct Wanted {
   struct Side {
     Backend backend = Backend::cpu;
     std::vector<std::string> settings;  ///< Settings::texts()
+    /// So many samples complete its picture, of `samples` that may be more; 0: there is no such number.
+    int most_samples = 0;
+    bool centred = false;  ///< its samples go through the pixel's centre, jittered or not
     bool operator==(const Side&) const = default;
   };
 
@@ -29,7 +32,7 @@ struct Wanted {
   Camera camera;
   int width = 0,
       height = 0;         ///< of the image, in pixels; 0: nothing is seen (minimised), and nothing is done
-  int samples = 1;        ///< a pixel, at the end
+  int samples = 1;        ///< a pixel, at the end, but for sides that are complete before
   bool jittered = false;  ///< as SampleRequest has it
   std::uint64_t seed = 0;
 
@@ -38,8 +41,8 @@ struct Wanted {
       false;  ///< more changes are to be expected soon: a coarse frame at once is better than a fine one
   bool difference = false;  ///< of A and B
   /// Above 0: make a reference of this view with so many samples first, and tell errors against it. It is
-  /// made by the settings that side A has then, and stays until scene, camera, size or this number change:
-  /// which other settings show another picture is not known here. Of a heat map there is none.
+  /// made by the settings that side A has then, and stays until scene, camera, size or this number change.
+  /// Figures::reference_differs says where a side is of other settings. Of a heat map there is none.
   int reference_samples = 0;
   int overlay_level = -1;  ///< of side A's structure; −1: none
 };
@@ -53,7 +56,7 @@ struct Frame {
   std::uint64_t generation = 0;  ///< of the newest wish that it was known to fulfil when it was made
   int samples = 0;               ///< complete ones
   int shrink = 1;                ///< pixels of the image to one rendered pixel, a side, where it is coarsest
-  bool complete = false;         ///< all samples that were wanted
+  bool complete = false;         ///< all samples that were wanted of its side
   Wanted::Side side;             ///< the settings that made it
   Display display;
   Camera camera;
@@ -87,9 +90,12 @@ struct Figures {
   /// By kind: "scene" (on the host), "structure", "rays and hits", "films and frames"; all but the first by
   /// Buffer's counter.
   std::vector<std::pair<std::string, std::size_t>> bytes;
-  std::vector<Saving> left_out;    ///< without the functions; measured when measure_omissions asked for it
+  std::vector<std::string> remarks;  ///< Demo::remarks after the last complete sample
+  std::vector<Saving> left_out;      ///< without the functions; measured when measure_omissions asked for it
   std::vector<ErrorPoint> errors;  ///< at 1, 2, 3, 4, 6, 8, 11, 16, … (√2 times as many) and all samples
-  int overlay_levels = 0;          ///< of the structure that was built: what Wanted::overlay_level may be
+  /// Settings of the reference, in words, by which it may be of another picture than this side; empty: none.
+  std::string reference_differs;
+  int overlay_levels = 0;  ///< of the structure that was built: what Wanted::overlay_level may be
   /// Of a heat map: how many pixels lie in each of 64 equal bins from 0 to `most` (1 where that is 0).
   std::vector<std::uint32_t> histogram;
   std::string failure;  ///< why there is no picture: what was refused, in one line; any wish tries again
@@ -99,7 +105,7 @@ struct Figures {
 struct Comparison {
   std::array<int, 2> samples{};  ///< of A and of B
   std::uint64_t generation = 0;
-  /// rmse, psnr, max_error; soon after, and where both have as many samples, ssim and flip.
+  /// rmse, psnr, max_error; soon after, and where both have as many samples or all of theirs, ssim and flip.
   std::vector<std::pair<std::string, double>> measures;
   std::shared_ptr<const Image> image;  ///< difference_image: display values
   double scale = 0;                    ///< the difference that is yellow in it
@@ -141,9 +147,11 @@ class RenderThread {
   std::optional<Comparison> comparison() const;
   std::vector<Line> overlay() const;
 
-  /// What the pixel's ray meets, on that side; `done` is called from a thread of its own, soon, unless the
-  /// picture changes before.
-  void inspect(int side, int x, int y, std::function<void(const Inspection&)> done);
+  /// What the ray of a pixel meets, on that side, in the scene and by the settings wanted last; camera and
+  /// size are those of the picture that was looked at. `done` is called once, from a thread of its own, soon
+  /// unless the side has to be built first: with the reason, as a fact, where there is nothing to know.
+  void inspect(int side, const Camera& camera, int width, int height, int x, int y,
+               std::function<void(const Inspection&)> done);
 
   /// The film of that side as it is now, as --output would write it, with the number of its complete samples;
   /// `done` is called from a thread of its own, with an error in words where there is no such image.

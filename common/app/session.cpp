@@ -190,12 +190,14 @@ Session::Session(std::function<std::unique_ptr<Demo>()> make_demo, const Options
   std::tie(chapter_, title_) = sides_[0].demo->name();
   if (options.samples) samples_ = *options.samples;
   width_ = options.width, height_ = options.height;
+  reference_samples_ = options.reference;
   if (!options.split.empty()) {
     take(read_flags(options.split), 1);
     split_ = was_split_ = true;
   }
   renderer_ = std::make_unique<RenderThread>(make_demo_, changed_);
   if (!options.scene.empty()) options_.scene = lasting_name(options.scene);
+  warn(options.warnings);
   ask({options_, needed(), false, {}, 0});
 }
 
@@ -213,16 +215,31 @@ void Session::update() {
   } else if (!asked_ && scene_ && !covers(loaded_, parts)) {
     ask({options_, both(loaded_, parts), true, {}, 0});
   }
+  tell_remarks();
   Wanted wish = this->wish();
   if (generation_ != 0 && equal(wish, wanted_)) return;
-  wanted_ = std::move(wish);
+  for (std::size_t i = 0; i < remarks_.size(); ++i)  // of the same from elsewhere they are no news
+    if (wish.scene != wanted_.scene || wish.sides.size() != wanted_.sides.size() ||
+        (i < wish.sides.size() && wish.sides[i] != wanted_.sides[i]))
+      remarks_[i].clear();
+  std::swap(wanted_, wish);
   generation_ = renderer_->want(wanted_);
+  const bool other_view = wish.scene != wanted_.scene || !equal(wish.camera, wanted_.camera) ||
+                          wish.width != wanted_.width || wish.height != wanted_.height ||
+                          wish.seed != wanted_.seed || wish.jittered != wanted_.jittered;
+  for (std::size_t i = 0; i < wanted_.sides.size(); ++i)
+    if (other_view || i >= wish.sides.size() || wish.sides[i] != wanted_.sides[i])
+      look_generations_[i] = generation_;
 }
 
 Wanted Session::wish() const {
   Wanted wish;
   wish.scene = scene_;
-  for (int i = 0; i < side_count(); ++i) wish.sides.push_back({side(i).backend, side(i).settings.texts()});
+  for (int i = 0; i < side_count(); ++i) {
+    const int complete = side(i).demo->samples().value_or(0);
+    wish.sides.push_back(
+        {side(i).backend, side(i).settings.texts(), complete, complete == 1 && !options_.jitter});
+  }
   wish.camera = camera_;
   wish.width = width_;
   wish.height = height_;
@@ -302,8 +319,15 @@ void Session::open_scene(const std::string& name_or_file) {
   ask({options, needed(), false, {}, 0});
 }
 
+/// Of this chapter; empty where it is load_scene's.
+std::string Session::default_scene() const {
+  const std::string scene = sides_[0].demo->default_scene();
+  return scene.empty() ? "" : lasting_name(scene);
+}
+
 void Session::ask(Request request) {
   request.number = ++requests_;
+  if (request.options.scene.empty()) request.options.scene = default_scene();
   request.parts.allow_paths = request.options.allow_paths;
   opening_ = request.options.scene.empty() ? "the first scene" : request.options.scene;
   asked_ = std::move(request);
@@ -366,10 +390,37 @@ void Session::show(const Request& request, std::shared_ptr<const Scene> scene) {
   if (request.again) return;
   std::vector<std::string> warnings = scene_->warnings;
   for (const std::string& line : sides_[0].demo->not_shown(*scene_)) warnings.push_back(line);
+  warn(warnings);
+}
+
+void Session::warn(const std::vector<std::string>& warnings) {
   constexpr std::size_t most = 4;  // lines that hide little of the image
   for (std::size_t i = 0; i < std::min(most, warnings.size()); ++i) notify(warnings[i]);
   if (warnings.size() > most)
     notify(counted(warnings.size() - most, "more warning") + "; --headless prints all of them");
+}
+
+/// What the samples met, once a run: that a number in it grows with every sample is no news.
+void Session::tell_remarks() {
+  if (renderer_->activity().generation < generation_) return;  // these figures may be of another wish
+  for (int i = 0; i < side_count(); ++i) {
+    const auto without_numbers = [](std::vector<std::string> lines) {
+      for (std::string& line : lines)
+        line.erase(std::remove_if(line.begin(), line.end(), [](char c) { return c >= '0' && c <= '9'; }),
+                   line.end());
+      return lines;
+    };
+    std::vector<std::string>& told = remarks_[static_cast<std::size_t>(i)];
+    std::vector<std::string> remarks = renderer_->figures(i).remarks;
+    if (remarks.empty()) continue;
+    if (without_numbers(remarks) != without_numbers(told)) {
+      std::vector<std::string> lines = remarks;
+      if (split_)
+        for (std::string& line : lines) line = (i == 0 ? "A: " : "B: ") + line;
+      warn(lines);
+    }
+    told = std::move(remarks);
+  }
 }
 
 double Session::aspect() const {
@@ -547,6 +598,7 @@ void Session::load_config(int side, const fs::path& file) {
 /// Settings and backend, and of A what belongs to no side.
 void Session::take(const Said& said, int side) {
   this->side(side).settings.set_texts(said.settings);
+  warn(said.options.warnings);
   if (said.options.backend) this->side(side).backend = *said.options.backend;
   if (side == 1) was_split_ = true;  // it is no copy of A any more
   if (side != 0) return;
@@ -585,7 +637,9 @@ void Session::take_with_scene(const Said& said) {
 std::vector<std::string> Session::flags(int side) const {
   Options options = options_;
   options.backend = this->side(side).backend;
-  options.samples = samples_;
+  const auto complete = this->side(side).demo->samples();
+  options.samples.reset();  // a file of its own accord gets as many as complete the picture
+  if (!complete || *complete > samples_) options.samples = samples_;
   return flags_of(options, this->side(side).settings);
 }
 

@@ -56,6 +56,8 @@ class Session {
   /// The wish that the renderer was told last.
   const Wanted& wanted() const { return wanted_; }
   std::uint64_t generation() const { return generation_; }
+  /// The newest wish that asked for other pixels of that side than the one before: what is older shows them.
+  std::uint64_t look_generation(int side) const { return look_generations_[static_cast<std::size_t>(side)]; }
 
   // ---- what the panel changes; update() does what is necessary ----
 
@@ -76,6 +78,7 @@ class Session {
   std::string why_not(Backend backend) const { return why_unavailable(backend); }
 
   void set_size(int width, int height);  ///< of the image, in pixels; 0, 0: nothing is seen
+  /// The most that a side gets; one whose settings complete its picture by fewer gets these.
   void set_samples(int samples);
   int samples() const { return samples_; }
   void pause(bool on) { paused_ = on; }
@@ -176,6 +179,9 @@ class Session {
   void ask(Request request);
   void load_next();
   void take_loaded();
+  std::string default_scene() const;
+  void warn(const std::vector<std::string>& warnings);
+  void tell_remarks();
   void show(const Request& request, std::shared_ptr<const Scene> scene);
   LoadOptions needed() const;
   double aspect() const;
@@ -216,6 +222,8 @@ class Session {
 
   Wanted wanted_;
   std::uint64_t generation_ = 0;
+  std::array<std::vector<std::string>, 2> remarks_;  ///< of each side, as they were told last
+  std::array<std::uint64_t, 2> look_generations_{};
   std::unique_ptr<RenderThread> renderer_;  ///< last: it ends first, with all that calls back from it
 };
 

@@ -38,6 +38,10 @@ struct Setting {
   /// Does it change anything, as the other settings are?
   bool active() const { return !applies || applies(); }
   bool changed() const { return text() != initial_text(); }
+  /// Such a value as words: "shading normals", "smooth", "not smooth".
+  std::string in_words(const std::string& value) const {
+    return kind == Kind::flag ? (value == "true" ? "" : "not ") + name : name + " " + value;
+  }
 
   /// The value as a word or number, as the command line takes it: the shortest that reads back exactly.
   std::string text() const { return text_of(get()); }

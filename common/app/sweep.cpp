@@ -49,12 +49,17 @@ Renderer renderer_of(Variant& variant, const Scene& scene, const Stream& stream)
   renderer.settings = variant.swept;
   renderer.build_ms = variant.build_ms;
   renderer.bytes = variant.bytes;
-  renderer.add_sample = [&variant, &scene](Film& film, std::uint32_t index, std::uint64_t seed,
-                                           const KeepGoing& keep_going) {
+  const std::optional<int> complete = variant.demo->samples();
+  renderer.most_samples = complete.value_or(renderer.most_samples);
+  const bool jittered = complete != 1;  // as a file or a window of that many samples would be
+  renderer.add_sample = [&variant, &scene, jittered](Film& film, std::uint32_t index, std::uint64_t seed,
+                                                     const KeepGoing& keep_going) {
     return variant.demo->add_sample(
-        film, {scene.camera, index, true, seed, 400, [&](double) { return keep_going(); }});
+        film, {scene.camera, index, jittered, seed, 400, [&](double) { return keep_going(); }});
   };
-  renderer.develop = [&variant, stream](const Film& film) { return developed(film, variant.demo->display(), stream); };
+  renderer.develop = [&variant, stream](const Film& film) {
+    return developed(film, variant.demo->display(), stream);
+  };
   return renderer;
 }
 
@@ -89,7 +94,7 @@ Sweep Sweep::parse(const std::string& text, const Settings& settings) {
 }
 
 Experiment sweep_experiment(const std::vector<Sweep>& sweeps, const Settings& base, const Scene& scene,
-                            const Stream& stream, int width, int height, int samples,
+                            const Stream& stream, int width, int height, std::optional<int> samples,
                             const std::function<std::unique_ptr<Demo>()>& make) {
   Experiment experiment;
   std::string names;
@@ -116,12 +121,22 @@ Experiment sweep_experiment(const std::vector<Sweep>& sweeps, const Settings& ba
     }
     const auto reference = make_variant({}, 0, base, scene, stream, make);
     reference->technique = "the settings as they were";
+    if (reference->demo->samples()) {
+      reference->demo->make_exact();
+      reference->demo->build(scene, stream);
+      reference->technique = "the most exact settings";
+    }
+    int most = 1;
+    for (const Renderer& renderer : renderers)
+      if (renderer.most_samples != Renderer().most_samples) most = std::max(most, renderer.most_samples);
     Accumulation what;
     what.scene = scene.name;
     what.width = width;
     what.height = height;
-    what.samples = samples;
-    what.reference_samples = std::max(64, 16 * samples);
+    what.samples = samples.value_or(most);
+    what.reference_samples = std::max(64, 16 * what.samples);
+    if (const auto complete = reference->demo->samples())  // of each half
+      what.reference_samples = std::min(what.reference_samples, 2 * *complete);
     what.seconds = report.left_s();
     accumulate(report, stream, renderer_of(*reference, scene, stream), renderers, what);
   };

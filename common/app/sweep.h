@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,10 +21,12 @@ struct Sweep {
 
 /// The experiment that --sweep runs: the scene rendered with every combination of the sweeps' values, all
 /// other settings as `base` has them. Each combination has a demo of its own, made by `make`; they take turns
-/// while samples accumulate, up to `samples` a pixel, and are compared with a reference made by the base
-/// settings.
+/// while samples accumulate, and are compared with a reference made by the base settings, or by
+/// Demo::make_exact of them where they complete their picture by some samples, which are no reference then. A
+/// combination has `samples` a pixel, if that is set, or one; but no more than, and by default all, that
+/// complete its picture.
 Experiment sweep_experiment(const std::vector<Sweep>& sweeps, const Settings& base, const Scene& scene,
-                            const Stream& stream, int width, int height, int samples,
+                            const Stream& stream, int width, int height, std::optional<int> samples,
                             const std::function<std::unique_ptr<Demo>()>& make);
 
 }  // namespace trilha

@@ -53,13 +53,18 @@ void Interface::viewport() {
         {static_cast<float>(image_.x), static_cast<float>(image_.y)},
         {static_cast<float>(image_.x + image_.width), static_cast<float>(image_.y + image_.height)}, true);
     const bool split = picture_.sides.size() == 2 && session_.is_split();
-    if (split && session_.difference_shown()) {
-      difference();
+    const bool differs = split && session_.difference_shown();
+    const std::optional<Comparison> comparison =
+        differs ? session_.renderer().comparison() : std::optional<Comparison>();
+    difference_shown_ = comparison ? comparison->image : nullptr;
+    if (difference_shown_) {
+      difference(*comparison);
     } else {
       if (labels_shown_) lines_over_image();
       if (split) divider();
       if (labels_shown_)
         for (int i = 0; i < session_.side_count(); ++i) side_label(i);
+      if (differs) why_no_difference();
     }
     ImGui::PopClipRect();
   }
@@ -128,15 +133,18 @@ std::string Interface::what_differs(int side, const Frame& frame, const Frame* o
     const Setting& setting = all[i];
     const bool shown = other != nullptr ? value != other->side.settings[i] : value != setting.initial_text();
     if (!shown) continue;
-    if (setting.kind == Setting::Kind::flag)
-      add((value == "true" ? "" : "not ") + setting.name);
-    else
-      add(setting.name + " " + value);
+    add(setting.in_words(value));
   }
   if (other == nullptr && text.empty()) add("settings as they are by default");
   if (other == nullptr || frame.side.backend != other->side.backend)
     add(frame.side.backend == Backend::cpu ? "CPU" : "CUDA");
   return text.empty() ? "the same settings on both sides" : text;
+}
+
+/// Is the side's picture of something else than what is wanted by now?
+bool Interface::is_before(int side) const {
+  const auto& frame = picture_.sides[static_cast<std::size_t>(side)];
+  return std::max(frame ? frame->generation : 0, picture_.generation) < session_.look_generation(side);
 }
 
 void Interface::side_label(int side) {
@@ -154,14 +162,18 @@ void Interface::side_label(int side) {
     second = figures.failure;
   else if (!frame)
     second = "its first picture is on its way";
-  else if (frame->side != session_.wanted().sides[static_cast<std::size_t>(side)])
-    second = "of the settings before; the new picture is on its way";
+  else if (is_before(side))
+    second = "as it was before; the new picture is on its way";
   else if (frame->shrink > 1)
     second = "coarse: one pixel in " + std::to_string(frame->shrink * frame->shrink);
   else
     second = counted(static_cast<std::uint64_t>(frame->samples), "sample") + ", " +
-             duration(figures.sample_ms) + " each, " + formatted("%.3g", figures.mrays_per_s) + " Mrays/s";
-  if (!figures.errors.empty()) second += ", RMSE " + formatted("%.2e", figures.errors.back().rmse);
+             (figures.samples > 0 ? duration(figures.render_ms / figures.samples) + " each, " +
+                                        formatted("%.3g", figures.mrays_per_s) + " Mrays/s"
+                                  : "time –");
+  if (!figures.errors.empty())
+    second += ", RMSE " + formatted("%.2e", figures.errors.back().rmse) +
+              (figures.reference_differs.empty() ? "" : " from " + figures.reference_differs);
 
   ImDrawList* draw = ImGui::GetWindowDrawList();
   const float pad = units(8), line = ImGui::GetFontSize(), letter = split ? units(28) : 0;
@@ -200,41 +212,50 @@ void Interface::side_label(int side) {
   }
 }
 
-void Interface::difference() {
-  const std::optional<Comparison> comparison = session_.renderer().comparison();
-  const bool current = comparison && comparison->image;
+void Interface::difference(const Comparison& comparison) {
   ImDrawList* draw = ImGui::GetWindowDrawList();
   const ImVec2 low{static_cast<float>(image_.x), static_cast<float>(image_.y)};
   const ImVec2 high{low.x + static_cast<float>(image_.width), low.y + static_cast<float>(image_.height)};
-  difference_shown_ = current ? comparison->image : nullptr;
-  if (current) {
-    if (!difference_texture_) difference_texture_ = std::make_unique<FrameTexture>();
-    difference_texture_->show(comparison->image);
-    draw->AddImage(texture_id(*difference_texture_), low, high);
-  }
+  if (!difference_texture_) difference_texture_ = std::make_unique<FrameTexture>();
+  difference_texture_->show(comparison.image);
+  draw->AddImage(texture_id(*difference_texture_), low, high);
   const float pad = units(10), line = ImGui::GetFontSize() * 1.35f;
-  const float rows = current ? static_cast<float>(comparison->measures.size()) + 2 : 2;
+  const float rows = static_cast<float>(comparison.measures.size()) + 2;
   const float wide = units(300), high_box = rows * line + units(56) + 2 * pad;
   const ImVec2 at{low.x + units(8), low.y + units(8)};
   draw->AddRectFilled(at, {at.x + wide, at.y + high_box}, shade, units(5));
   float y = at.y + pad;
   draw->AddText(fonts().strong, ImGui::GetFontSize(), {at.x + pad, y}, white, "Difference of A and B");
   y += line;
-  if (!current) {
-    draw->AddText({at.x + pad, y}, grey, "is being measured …");
-    return;
-  }
-  const std::string samples = counted(static_cast<std::uint64_t>(comparison->samples[0]), "sample") +
-                              " of A, " + std::to_string(comparison->samples[1]) + " of B";
+  const std::string samples = counted(static_cast<std::uint64_t>(comparison.samples[0]), "sample") +
+                              " of A, " + std::to_string(comparison.samples[1]) + " of B";
   draw->AddText({at.x + pad, y}, grey, samples.c_str());
-  for (const auto& [measure, value] : comparison->measures) {
+  for (const auto& [measure, value] : comparison.measures) {
     y += line;
     draw->AddText({at.x + pad, y}, grey, measure.c_str());
     const std::string number = std::isinf(value) ? "∞" : formatted("%.4g", value);
     draw->AddText({at.x + wide - pad - ImGui::CalcTextSize(number.c_str()).x, y}, white, number.c_str());
   }
   ImGui::SetCursorScreenPos({at.x + pad, y + line + units(6)});
-  colour_bar({wide - 2 * pad, 0}, comparison->scale, "mean |A − B| of a pixel's channels");
+  colour_bar({wide - 2 * pad, 0}, comparison.scale, "mean |A − B| of a pixel's channels");
+}
+
+/// Until there is a difference A and B are shown as ever, with what is waited for below them.
+void Interface::why_no_difference() {
+  std::string text = session_.paused() ? "Difference of A and B: none yet, for it is paused"
+                                       : "Difference of A and B: is being measured …";
+  for (int i = 0; i < 2; ++i)
+    if (!session_.renderer().figures(i).failure.empty())
+      text = std::string("Difference of A and B: none, for ") + side_names[i] + " has failed";
+  const ImVec2 size = ImGui::CalcTextSize(text.c_str());
+  const float x = std::round(static_cast<float>(image_.x) + (static_cast<float>(image_.width) - size.x) / 2),
+              y = static_cast<float>(image_.y + image_.height) - size.y - units(24);
+  ImDrawList* draw = ImGui::GetWindowDrawList();
+  draw->AddRectFilled({x - units(8), y - units(8)}, {x + size.x + units(8), y + size.y + units(8)}, shade,
+                      units(5));
+  draw->AddText({x, y}, white, text.c_str());
+  widgets_["no difference"] = {static_cast<int>(x), static_cast<int>(y), static_cast<int>(size.x),
+                               static_cast<int>(size.y)};
 }
 
 // ---- over the image ----------------------------------------------------------
@@ -257,6 +278,7 @@ void Interface::lines_over_image() {
   const std::lock_guard lock(pixel_->mutex);
   for (const Line& line : pixel_->inspection.lines) stroke(line, 1.75f);
   double x = pixel_->x + 0.5, y = pixel_->y + 0.5;
+  if (!pixel_->inspection.point && !in_view_of(*pixel_)) return;  // what is there now is another ray's
   if (pixel_->inspection.point) {
     const Projected at = projected(camera, image_.width, image_.height, *pixel_->inspection.point);
     if (!at.in_front) return;
@@ -281,7 +303,8 @@ void Interface::pixel_card() {
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoSavedSettings);
   ImGui::PushAllowKeyboardFocus(false);
-  const std::string title = "Pixel " + std::to_string(pixel->x) + ", " + std::to_string(pixel->y) +
+  const std::string title = (in_view_of(*pixel) ? "Pixel " : "From before: pixel ") +
+                            std::to_string(pixel->x) + ", " + std::to_string(pixel->y) +
                             (session_.is_split() ? std::string(", side ") + side_names[pixel->side] : "");
   ImGui::PushFont(fonts().strong);
   ImGui::TextUnformatted(title.c_str());
@@ -311,16 +334,56 @@ void Interface::pixel_card() {
 }
 
 void Interface::click(int x, int y) {
-  if (x < 0 || y < 0 || x >= image_.width || y >= image_.height || picture_.sides.empty()) return;
+  if (x < 0 || y < 0 || x >= image_.width || y >= image_.height) return;
   const bool right =
       session_.is_split() && static_cast<float>(x) >= std::round(divider_ * static_cast<float>(image_.width));
+  const std::size_t side = right ? 1 : 0;
+  if (side >= picture_.sides.size() || side >= session_.wanted().sides.size() || !picture_.sides[side])
+    return;
+  const Frame& frame = *picture_.sides[side];
+  // the picture may have another size, for a moment, than its place
+  ask(static_cast<int>(side), frame.camera, frame.image_width, frame.image_height,
+      x * frame.image_width / image_.width, y * frame.image_height / image_.height, false);
+}
+
+/// Asks what a pixel's ray meets, as scene and settings are wanted by now.
+void Interface::ask(int side, const Camera& camera, int width, int height, int x, int y, bool focus) {
   pixel_ = std::make_shared<Pixel>();
-  pixel_->x = x, pixel_->y = y, pixel_->side = right ? 1 : 0;
-  session_.renderer().inspect(pixel_->side, x, y, [pixel = pixel_](const Inspection& inspection) {
-    const std::lock_guard lock(pixel->mutex);
-    pixel->inspection = inspection;
-    pixel->answered = true;
-  });
+  pixel_->x = x, pixel_->y = y, pixel_->side = side;
+  pixel_->width = width, pixel_->height = height;
+  pixel_->camera = camera;
+  pixel_->scene = session_.wanted().scene.get();
+  pixel_->of = session_.wanted().sides[static_cast<std::size_t>(side)];
+  pixel_->focus = focus;
+  session_.renderer().inspect(side, camera, width, height, x, y,
+                              [pixel = pixel_](const Inspection& inspection) {
+                                const std::lock_guard lock(pixel->mutex);
+                                pixel->inspection = inspection;
+                                pixel->answered = true;
+                              });
+}
+
+/// Is the picture still of the camera and size that the pixel was seen by?
+bool Interface::in_view_of(const Pixel& pixel) const {
+  const auto side = static_cast<std::size_t>(pixel.side);
+  if (side >= picture_.sides.size() || !picture_.sides[side]) return false;
+  const Frame& frame = *picture_.sides[side];
+  const Camera &a = frame.camera, &b = pixel.camera;
+  return a.eye == b.eye && a.target == b.target && a.up == b.up && a.field_of_view == b.field_of_view &&
+         frame.image_width == pixel.width && frame.image_height == pixel.height;
+}
+
+/// What was asked of another scene, or of a side that is gone, is forgotten; of other settings it is asked
+/// again.
+void Interface::check_pixel() {
+  if (!pixel_) return;
+  const Wanted& wanted = session_.wanted();
+  const auto side = static_cast<std::size_t>(pixel_->side);
+  if (side >= wanted.sides.size() || pixel_->scene != wanted.scene.get()) return pixel_.reset();
+  if (pixel_->of == wanted.sides[side]) return;
+  const std::shared_ptr<Pixel> old = pixel_;
+  const std::lock_guard lock(old->mutex);
+  ask(old->side, old->camera, old->width, old->height, old->x, old->y, old->focus);
 }
 
 void Interface::move_camera() {
@@ -331,8 +394,8 @@ void Interface::move_camera() {
   Camera camera = session_.camera();
   bool moves = false;
   if (ImGui::IsItemActivated())
-    dragging_divider_ = session_.is_split() && !session_.difference_shown() && ImGui::IsMouseDown(0) &&
-                        std::fabs(x - line) < units(8);
+    dragging_divider_ =
+        session_.is_split() && !difference_shown_ && ImGui::IsMouseDown(0) && std::fabs(x - line) < units(8);
   if (ImGui::IsItemActive()) {
     const float dx = io.MouseDelta.x, dy = io.MouseDelta.y;
     const auto dragged = [&](int button) {

@@ -207,6 +207,12 @@ void write_screenshot(const MakeDemo& make_demo, const Options& options,
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
     if (interrupted()) throw InputError("--screenshot: stopped before the image was complete");
     session.require_a_scene();
+    const Activity activity = session.renderer().activity();
+    std::string failure =
+        activity.reference_failure.empty() ? "" : "--reference: " + activity.reference_failure;
+    for (int i = session.side_count() - 1; i >= 0; --i)
+      if (const std::string own = session.renderer().figures(i).failure; !own.empty()) failure = own;
+    if (!failure.empty() && activity.generation == session.generation()) throw InputError(failure);
     drawn = interface.complete() ? drawn + 1 : 0;
   } while (drawn < 4);
   write_image(options.screenshot, screen.image());

@@ -6,11 +6,13 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
+#include <optional>
 #include <source_location>
 
 #include "common/math/vector.h"
 #include "common/parallel/backend.h"
 #include "common/parallel/cancellation.h"
+#include "common/parallel/kernel_cost.h"
 
 #if defined(__CUDACC__)
 #include "cuda/launch.h"
@@ -70,6 +72,18 @@ void for_each(const Stream& stream, IndexRange range, const Pass& pass, std::siz
 #else
   throw std::logic_error(std::string(where.file_name()) +
                          ": a pass for CUDA in a source that nvcc does not compile");
+#endif
+}
+
+/// What the kernel of a pass takes on the stream's device; nothing on the CPU, which has no kernels. A source
+/// that the C++ compiler sees can ask for the CPU only.
+template <class Pass>
+std::optional<KernelCost> kernel_cost(const Stream& stream) {
+  if (stream.backend() == Backend::cpu) return std::nullopt;
+#if defined(__CUDACC__)
+  return cuda::kernel_cost<Pass>();
+#else
+  throw std::logic_error("a pass for CUDA in a source that nvcc does not compile");
 #endif
 }
 

@@ -15,6 +15,7 @@ Image developed(const Renderer& renderer, const Film& film, const Stream& stream
 /// One renderer on its way.
 struct Line {
   Film film;
+  std::vector<int> points;              ///< numbers of samples, in order
   std::vector<std::vector<double>> ms;  ///< at each point of the line, of each repeat
   std::vector<std::vector<float>>
       squared;  ///< at each point, the sum over repeats of a pixel's squared error
@@ -52,7 +53,7 @@ Image accumulate(Report& report, const Stream& stream, const Renderer& reference
   double round_ms = 0;  // a sample of every renderer
   bool going = true;
   for (const Renderer& renderer : renderers) {
-    lines.push_back({Film(stream, what.width, what.height), {}, {}});
+    lines.push_back({Film(stream, what.width, what.height), {}, {}, {}});
     going = going && renderer.add_sample(lines.back().film, 0, first_seed + 998, keep_going);  // warms up
     Timer timer(stream);
     going = going && renderer.add_sample(lines.back().film, 0, first_seed + 999, keep_going);
@@ -88,21 +89,28 @@ Image accumulate(Report& report, const Stream& stream, const Renderer& reference
   if (samples < what.samples)
     report.leave_out(where + ": of " + std::to_string(what.samples) + " samples a pixel all but " +
                      std::to_string(samples));
-  std::vector<int> points;  // of a line
-  for (int n = 1; n < samples; n *= 2) points.push_back(n);
-  points.push_back(samples);
-  for (Line& line : lines) line.ms.resize(points.size()), line.squared.resize(points.size());
+  std::size_t most_points = 0;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    Line& line = lines[i];
+    const int last = std::min(samples, renderers[i].most_samples);
+    for (int n = 1; n < last; n *= 2) line.points.push_back(n);
+    line.points.push_back(last);
+    line.ms.resize(line.points.size()), line.squared.resize(line.points.size());
+    most_points = std::max(most_points, line.points.size());
+  }
 
   for (int repeat = 0; repeat < what.repeats && going; ++repeat) {
     const std::uint64_t seed = first_seed + static_cast<std::uint64_t>(repeat);
     std::vector<double> spent(renderers.size(), 0);
     for (Line& line : lines) line.film.clear(stream);
-    for (std::size_t point = 0; point < points.size() && going; ++point)
+    for (std::size_t point = 0; point < most_points && going; ++point)
       for (std::size_t k = 0; k < renderers.size() && going; ++k) {
         const std::size_t i = (k + static_cast<std::size_t>(repeat)) % renderers.size();
         Line& line = lines[i];
+        if (point >= line.points.size()) continue;
         Timer timer(stream);
-        for (int sample = point == 0 ? 0 : points[point - 1]; sample < points[point] && going; ++sample)
+        for (int sample = point == 0 ? 0 : line.points[point - 1]; sample < line.points[point] && going;
+             ++sample)
           going = renderers[i].add_sample(line.film, static_cast<std::uint32_t>(sample), seed, keep_going);
         spent[i] += timer.milliseconds();
         if (!going) break;
@@ -112,13 +120,13 @@ Image accumulate(Report& report, const Stream& stream, const Renderer& reference
     report.progress(double(repeat + 1) / what.repeats);
   }
   for (std::size_t i = 0; i < renderers.size(); ++i)
-    for (std::size_t k = 0; k < points.size(); ++k) {
+    for (std::size_t k = 0; k < lines[i].points.size(); ++k) {
       Row row;
       row.scene = what.scene;
       row.backend = stream.backend();
       row.technique = renderers[i].technique;
       row.settings = renderers[i].settings;
-      row.settings["samples"] = double(points[k]);
+      row.settings["samples"] = double(lines[i].points[k]);
       row.settings["width"] = double(what.width);
       row.settings["height"] = double(what.height);
       row.settings["reference"] = reference.technique;
@@ -127,7 +135,7 @@ Image accumulate(Report& report, const Stream& stream, const Renderer& reference
       row.errors = {{"rmse", root_mean(lines[i].squared[k], row.time_ms.repeats)}, {"rmse_floor", floor}};
       row.build_ms = renderers[i].build_ms;
       row.bytes = renderers[i].bytes;
-      row.rays = double(what.width) * what.height * points[k];
+      row.rays = double(what.width) * what.height * lines[i].points[k];
       report.add(std::move(row));
     }
   return truth;

@@ -1,6 +1,7 @@
 #pragma once
 // Image error over run time while samples accumulate: what exact structures buy, and what inexact ones cost.
 
+#include <limits>
 #include <map>
 
 #include "common/image/film.h"
@@ -16,6 +17,8 @@ struct Renderer {
   std::string technique;
   std::map<std::string, SettingValue> settings;
   std::optional<double> build_ms, bytes;
+  /// With so many samples the image is complete: its line ends there. Not of a reference.
+  int most_samples = std::numeric_limits<int>::max();
   /// Adds sample number `index` of the sequence that the seed names to every pixel. Returns false if stopped.
   std::function<bool(Film& film, std::uint32_t index, std::uint64_t seed, const KeepGoing&)> add_sample;
   /// The film as an image; its plain mean if this is empty.
@@ -34,11 +37,11 @@ struct Accumulation {
 };
 
 /// Lets the renderers take turns, each with a film of its own, and adds rows for 1, 2, 4, … and `samples`
-/// samples: the time to get there, and the RMSE against the reference, which `reference` makes with other
-/// random numbers. The error's interval takes pixels, each with the mean of its repeats' squared errors, as
-/// independent. Each row also says the floor: what the reference itself may be wrong by, from the difference
-/// of its halves; an error that all its samples share, such as that of a wrong renderer, is not in it.
-/// Returns the reference image.
+/// samples, or the most that a renderer takes: the time to get there, and the RMSE against the reference,
+/// which `reference` makes with other random numbers. The error's interval takes pixels, each with the mean
+/// of its repeats' squared errors, as independent. Each row also says the floor: what the reference itself
+/// may be wrong by, from the difference of its halves; an error that all its samples share, such as that of a
+/// wrong renderer, is not in it. Returns the reference image.
 Image accumulate(Report& report, const Stream& stream, const Renderer& reference,
                  const std::vector<Renderer>& renderers, const Accumulation& what);
 

@@ -60,22 +60,37 @@ bool StabilityTable::has_picture(const StabilityRow& row) const {
 }
 
 void StabilityTable::print(std::ostream& out) const {
-  std::vector<std::string> techniques;
-  std::map<std::pair<std::string, std::string>, std::size_t> lines;
-  std::vector<std::vector<std::string>> table{{"case", "machine"}};
+  // a table for each list of techniques that cases have been tried with
+  std::map<std::string, std::vector<std::string>> techniques_of;
+  for (const StabilityRow& row : rows_) {
+    auto& techniques = techniques_of[row.case_name];
+    if (std::find(techniques.begin(), techniques.end(), row.technique) == techniques.end())
+      techniques.push_back(row.technique);
+  }
+  std::vector<std::vector<std::string>> lists;
   std::vector<std::string> units;
   for (const StabilityRow& row : rows_) {
-    const auto found = std::find(techniques.begin(), techniques.end(), row.technique);
-    const auto column = static_cast<std::size_t>(found - techniques.begin());
-    if (found == techniques.end()) techniques.push_back(row.technique), table[0].push_back(row.technique);
-    const auto [line, is_new] = lines.try_emplace({row.case_name, name(row.backend)}, table.size());
-    if (is_new) table.push_back({row.case_name, name(row.backend)});
-    auto& cells = table[line->second];
-    cells.resize(std::max(cells.size(), column + 3));
-    cells[column + 2] = cell(row);
+    const auto& techniques = techniques_of[row.case_name];
+    if (std::find(lists.begin(), lists.end(), techniques) == lists.end()) lists.push_back(techniques);
     if (std::find(units.begin(), units.end(), row.unit) == units.end()) units.push_back(row.unit);
   }
-  print_table(out, table);
+  for (const auto& techniques : lists) {
+    std::map<std::pair<std::string, std::string>, std::size_t> lines;
+    std::vector<std::vector<std::string>> table{{"case", "machine"}};
+    table[0].insert(table[0].end(), techniques.begin(), techniques.end());
+    for (const StabilityRow& row : rows_) {
+      if (techniques_of[row.case_name] != techniques) continue;
+      const auto column = static_cast<std::size_t>(
+          std::find(techniques.begin(), techniques.end(), row.technique) - techniques.begin());
+      const auto [line, is_new] = lines.try_emplace({row.case_name, name(row.backend)}, table.size());
+      if (is_new) table.push_back({row.case_name, name(row.backend)});
+      auto& cells = table[line->second];
+      cells.resize(techniques.size() + 2);
+      cells[column + 2] = cell(row);
+    }
+    print_table(out, table);
+    if (&techniques != &lists.back()) out << "\n";
+  }
   out << "failures of how many, worst error (";
   for (std::size_t k = 0; k < units.size(); ++k) out << (k > 0 ? "; " : "") << units[k];
   out << ")\n";

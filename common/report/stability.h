@@ -40,7 +40,8 @@ class StabilityTable {
   const std::vector<StabilityRow>& rows() const { return rows_; }
   /// Rows with failures that are not by nature: each is a bug, or an excuse that is missing.
   std::vector<const StabilityRow*> unexcused() const;
-  /// A line for every case and machine, a column for every technique.
+  /// A line for every case and machine, a column for every technique; cases that were tried with other
+  /// techniques in a table of their own.
   void print(std::ostream& out) const;
   std::string json(const std::string& chapter) const;
   /// Writes stability.json into the folder, and for every case with a failure the pictures of all techniques,

@@ -69,8 +69,8 @@ int Parameters::whole(std::string_view name) const { return static_cast<int>((*t
 const std::vector<MadeScene>& made_scenes() {
   static const std::vector<MadeScene> all = [] {
     std::vector<MadeScene> list;
-    for (const auto& some :
-         {tea_scenes(), box_and_shape_scenes(), hall_scenes(), whitted_scenes(), extreme_scenes()})
+    for (const auto& some : {tea_scenes(), box_and_shape_scenes(), hall_scenes(), whitted_scenes(),
+                             still_life_scenes(), loggia_scenes(), feature_scenes(), extreme_scenes()})
       list.insert(list.end(), some.begin(), some.end());
     return list;
   }();

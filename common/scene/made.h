@@ -65,6 +65,9 @@ const std::vector<MadeScene>& made_scenes();
 std::vector<MadeScene> hall_scenes();
 std::vector<MadeScene> box_and_shape_scenes();
 std::vector<MadeScene> whitted_scenes();
+std::vector<MadeScene> still_life_scenes();
+std::vector<MadeScene> loggia_scenes();
+std::vector<MadeScene> feature_scenes();
 std::vector<MadeScene> tea_scenes();
 std::vector<MadeScene> extreme_scenes();
 

@@ -18,7 +18,7 @@ struct Map {
   std::int8_t channel = 0;    ///< of a map of single numbers: 0 red, 1 green, 2 blue, 3 alpha
   vec2 scale{1}, offset{0};
 
-  explicit operator bool() const { return texture >= 0; }
+  constexpr explicit operator bool() const { return texture >= 0; }
 };
 
 /// How a surface looks. Colours are linear, Rec. 709 primaries. A map's value multiplies the number or colour

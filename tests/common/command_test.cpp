@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "chapters/01_ray_casting/demo.h"
@@ -263,6 +265,230 @@ TEST_CASE("a file of flags is read as it is described") {
   }
 }
 
+namespace {
+
+enum class Escape { error_bound, fixed };
+
+/// With the settings that Ordeix & Cioli's configuration file is about.
+class WhittedDemo : public FakeDemo {
+ public:
+  std::pair<std::string, std::string> name() const override { return {"02_whitted", "Whitted"}; }
+  void declare_settings(Settings& settings) override {
+    settings.integer("depth", depth, 0, 64, Effect::restart, "of the tree of rays");
+    settings.number("farthest", farthest, 0, 3e38f, Effect::restart, "that a ray goes");
+    settings.choice("self-intersection", escape, {{0, "error-bound", ""}, {1, "fixed", ""}}, Effect::restart,
+                    "how");
+    settings.number("fixed-offset", offset, 0, 1, Effect::restart, "how far");
+    settings.integer("block-width", width, 1, 1024, Effect::restart, "threads");
+    settings.integer("block-height", height, 1, 1024, Effect::restart, "threads");
+  }
+  int depth = 5, width = 8, height = 8;
+  float farthest = 1e38f, offset = 5e-5f;
+  Escape escape = Escape::error_bound;
+};
+
+/// As Said, of that demo.
+struct SaidOfWhitted {
+  WhittedDemo demo;
+  Settings settings;
+  Options options;
+  SaidOfWhitted() { demo.declare_settings(settings); }
+};
+
+const char* const configuration =
+    "\xef\xbb\xbf/* cells: 64\n   by 50 by 40 */\r\n"
+    "TAMANIO_GRILLA.X=64 /* x */\n"
+    "TAMANIO_GRILLA.Y=50\nTAMANIO_GRILLA.Z=40\n\n"
+    "  RESOLUCION.Y = /* in pixels */ 90\r\n"
+    "INFINITO= 34028234660000000\n"
+    "RESOLUCION.X=120\n"
+    "ZERO=0.000001 /* \xe1\xe9 # = TAMANIO_GRILLA.X=1 */\n"
+    "PROFUNDIDAD_RECURSION=3\nTHREADS.X=16\nTHREADS.Y=4\n"
+    "ESCENA=../my scenes/a, b.obj";
+
+}  // namespace
+
+// Catches: a key that is lost or goes to another flag, a comment that is read, a scene that another working
+// directory changes, a file that is silent about what it does not do.
+TEST_CASE("the configuration file of Ordeix & Cioli is read as flags") {
+  Folder folder;
+  const std::string file = folder / "settings.cfg";
+  write(file, configuration);
+  SaidOfWhitted said;
+  read_config_file(file, said.demo, said.settings, said.options);
+  CHECK((said.options.width == 120 && said.options.height == 90));
+  CHECK(said.options.scene == (folder.path.parent_path() / "my scenes" / "a, b.obj").string());
+  CHECK(said.demo.depth == 3);
+  CHECK(said.demo.farthest == 34028234660000000.0f);
+  CHECK(said.demo.escape == Escape::fixed);
+  CHECK(said.demo.offset == 0.000001f);
+  CHECK((said.demo.width == 16 && said.demo.height == 4));
+  CHECK(said.options.warnings ==
+        std::vector<std::string>{file +
+                                 ":3: TAMANIO_GRILLA has no use here; 03_uniform_grid takes it as --grid-x"});
+
+  Said other;  // a chapter with none of the settings
+  read_config_file(file, other.demo, other.settings, other.options);
+  CHECK((other.options.width == 120 && other.options.height == 90));
+  REQUIRE(other.options.warnings.size() == 5);
+  const std::pair<const char*, const char*> left_out[] = {{":3: TAMANIO_GRILLA has", "03_uniform_grid"},
+                                                          {":8: INFINITO has", "--farthest"},
+                                                          {":10: ZERO has", "--fixed-offset"},
+                                                          {":11: PROFUNDIDAD_RECURSION has", "--depth"},
+                                                          {":12: THREADS has", "02_whitted"}};
+  for (std::size_t i = 0; i < 5; ++i) {
+    INFO(other.options.warnings[i]);
+    CHECK(other.options.warnings[i].find(left_out[i].first) != std::string::npos);
+    CHECK(other.options.warnings[i].find(left_out[i].second) != std::string::npos);
+  }
+  CHECK(other.settings.texts() == Said().settings.texts());
+
+  const auto scene_of = [&](const std::string& text) {
+    Said of_scene;
+    write(folder / "scene.cfg", text);
+    read_config_file(folder / "scene.cfg", of_scene.demo, of_scene.settings, of_scene.options);
+    return of_scene.options.scene;
+  };
+  CHECK(scene_of("ESCENA=bunny") == "bunny");
+  CHECK(scene_of("ESCENA = /tmp/a.obj") == "/tmp/a.obj");
+  CHECK(scene_of("\n/**/ESCENA = a.obj") == folder / "a.obj");
+  const fs::path before = fs::current_path();
+  fs::current_path(folder.path);
+  Said here;
+  read_config_file("scene.cfg", here.demo, here.settings, here.options);
+  CHECK(here.options.scene == "a.obj");
+  fs::current_path(before);
+}
+
+// Catches: a file that overrules what was typed.
+TEST_CASE("the command line goes before the configuration file of Ordeix & Cioli") {
+  Folder folder;
+  const std::string file = folder / "settings.cfg";
+  write(file, configuration);
+  SaidOfWhitted said;
+  read({"--depth", "9", "--config", file, "--size", "33x44", "--self-intersection", "error-bound"}, said.demo,
+       said.settings, said.options);
+  CHECK(said.demo.depth == 9);
+  CHECK((said.options.width == 33 && said.options.height == 44));
+  CHECK(said.demo.escape == Escape::error_bound);
+  CHECK(said.demo.offset == 0.000001f);
+  CHECK(said.demo.width == 16);
+}
+
+// Catches: a value that is taken for another, or a refusal that does not say where and of which key.
+TEST_CASE("what is wrong with a configuration file of Ordeix & Cioli is refused with line and key") {
+  Folder folder;
+  const std::string file = folder / "settings.cfg";
+  const std::pair<std::string, const char*> refused[] = {
+      {"THREADS.X=8\nPROFUNDIDAD_RECURSION=65", ":2: PROFUNDIDAD_RECURSION: --depth: '65' is out of range"},
+      {"PROFUNDIDAD_RECURSION=-1", ":1: PROFUNDIDAD_RECURSION: --depth: '-1' is out of range"},
+      {"PROFUNDIDAD_RECURSION=3.5", ":1: PROFUNDIDAD_RECURSION: '3.5' is no whole number"},
+      {"PROFUNDIDAD_RECURSION=", ":1: PROFUNDIDAD_RECURSION has no value"},
+      {"PROFUNDIDAD_RECURSION", ":1: PROFUNDIDAD_RECURSION has no value"},
+      {"PROFUNDIDAD_RECURSION=/* three */", ":1: PROFUNDIDAD_RECURSION has no value"},
+      {"PROFUNDIDAD_RECURSION=1\n\nPROFUNDIDAD_RECURSION=1", ":3: PROFUNDIDAD_RECURSION is said in line 1"},
+      {"ZERO=tiny", ":1: ZERO: 'tiny' is no number"},
+      {"ZERO=nan", ":1: ZERO: 'nan' is no number"},
+      {"ZERO=2", ":1: ZERO: --fixed-offset: '2' is out of range"},
+      {"INFINITO=inf", ":1: INFINITO: 'inf' is no number"},
+      {"INFINITO=1e400", ":1: INFINITO: '1e400' is no number"},
+      {"INFINITO=4e38", ":1: INFINITO: --farthest: '4e38' is out of range"},
+      {"TAMANIO_GRILLA.X=1e3", ":1: TAMANIO_GRILLA.X: '1e3' is no whole number"},
+      {"TAMANIO_GRILLA.W=3", "'TAMANIO_GRILLA.W' is no flag"},
+      {"ZERO=0\nTAMANIO_GRILLA.W=3", ":2: 'TAMANIO_GRILLA.W' is no key of such a file"},
+      {"ZERO=0\nsize = 3x3", ":2: 'size' is no key of such a file"},
+      {"ZERO=0\n# ZERO", ":2: '# ZERO' is no key of such a file"},
+      {"ZERO=0\n=3", ":2: '' is no key of such a file"},
+      {"RESOLUCION.X=640\nZERO=0\n", ":1: RESOLUCION.X says half of a size"},
+      {"ZERO=0\nRESOLUCION.Y=640", ":2: RESOLUCION.Y says half of a size"},
+      {"RESOLUCION.X=640\nRESOLUCION.Y=0", ":2: RESOLUCION: --size: an image of 640x0 pixels"},
+      {"RESOLUCION.X=99999999999999999999\nRESOLUCION.Y=1", ":1: RESOLUCION.X: '99999999999999999999' is no"},
+      {"RESOLUCION.X=640.0\nRESOLUCION.Y=1", ":1: RESOLUCION.X: '640.0' is no whole number"},
+      {"ZERO=0\n\n/* a\nb", ":3: a comment is not closed"},
+      {"ZERO=0 /*/", ":1: a comment is not closed"},
+      {"ZERO=0 */", ":1: ZERO: '0 */' is no number"},
+      {"ZERO=0\nESCENA=a\x01.obj", ":2: a control character"},
+      {"ZERO=0\nESCENA=" + std::string(1100, 'x'), ":2: a line of 1107 bytes"},
+  };
+  for (const auto& [text, words] : refused) {
+    INFO(text);
+    write(file, text);
+    for (const bool whole : {false, true}) {
+      SaidOfWhitted said;
+      const auto told = refusal([&] {
+        std::string words[] = {"02_whitted", "--config", file};
+        char* pointers[] = {words[0].data(), words[1].data(), words[2].data()};
+        if (whole)
+          read_command_line(3, pointers, said.demo, said.settings, said.options);
+        else
+          read_config_file(file, said.demo, said.settings, said.options);
+      });
+      REQUIRE(told.has_value());
+      INFO(*told);
+      CHECK(told->find(words) != std::string::npos);
+      CHECK(told->find("settings.cfg:") != std::string::npos);
+      CHECK(lines(*told) == 0);
+      CHECK(told->size() < 600);
+    }
+  }
+}
+
+// Catches: hooks of a chapter that its program does not ask: scene, samples and remarks of a file, and of a
+// sweep.
+TEST_CASE("a program takes default scene and samples from its chapter, and passes on its remarks") {
+  Folder folder;
+  const auto ran = [&](std::vector<std::string> words, std::string& out, std::string& err) {
+    words.insert(words.begin(), "97_fakes");
+    std::vector<char*> pointers;
+    for (std::string& word : words) pointers.push_back(word.data());
+    std::ostringstream to_out, to_err;
+    std::streambuf *const before_out = std::cout.rdbuf(to_out.rdbuf()), *const before_err =
+                                                                            std::cerr.rdbuf(to_err.rdbuf());
+    const int code = run_program(static_cast<int>(words.size()), pointers.data(),
+                                 [] { return std::make_unique<CompletingDemo>(); });
+    std::cout.rdbuf(before_out), std::cerr.rdbuf(before_err);
+    out = to_out.str(), err = to_err.str();
+    return code;
+  };
+  const auto json = [&](const std::vector<std::string>& flags, std::string& err) {
+    std::vector<std::string> words{"--backend", "cpu",      "--size",        "8x8",
+                                   "--json",    "--output", folder / "a.png"};
+    words.insert(words.end(), flags.begin(), flags.end());
+    std::string out;
+    const int code = ran(words, out, err);
+    INFO(err);
+    REQUIRE(code == 0);
+    return nlohmann::json::parse(out);
+  };
+  std::string err;
+  const auto usual = json({}, err);
+  CHECK(usual["scene"] == "teapot");
+  CHECK(usual["samples"] == 1);
+  CHECK(err.find("warning") == std::string::npos);
+  CHECK(json({"--ripe", "--count", "5", "--fruit", "plum's \"own\", #1"}, err)["samples"] == 5);
+  CHECK(err.find("warning: 5 plums were sour\n") != std::string::npos);
+  CHECK(json({"--ripe", "--count", "5", "--samples", "7"}, err)["samples"] == 7);
+  CHECK(json({"--scene", "torus_knot"}, err)["scene"] == "torus_knot");
+  write(folder / "f.cfg", "THREADS.X=3\n");
+  json({"--config", folder / "f.cfg"}, err);
+  CHECK(err.find("warning: " + (folder / "f.cfg") + ":1: THREADS has no use here") != std::string::npos);
+
+  std::string out;
+  REQUIRE(ran({"--backend", "cpu", "--size", "8x8", "--quiet", "--ripe", "--sweep", "count=2,5", "--report",
+               folder / "r"},
+              out, err) == 0);
+  INFO(err);
+  std::map<std::string, std::vector<int>> samples;
+  const auto report = nlohmann::json::parse(contents(folder / "r/report.json"));
+  for (const auto& row : report["rows"]) {
+    CHECK(row["scene"] == "teapot");
+    CHECK(row["settings"]["reference"] == "the most exact settings");
+    CHECK(row["settings"]["reference_samples"] == 6);  // two halves of the three that are complete
+    samples[row["technique"]].push_back(row["settings"]["samples"]);
+  }
+  CHECK(samples == std::map<std::string, std::vector<int>>{{"2", {1, 2}}, {"5", {1, 2, 4, 5}}});
+}
+
 // Catches: a window where only a file was asked for, or none where it was not.
 TEST_CASE("headless is what was said, and what only a file can answer") {
   const auto headless = [](const std::vector<std::string>& flags) {
@@ -272,6 +498,7 @@ TEST_CASE("headless is what was said, and what only a file can answer") {
   };
   CHECK_FALSE(headless({}));
   CHECK_FALSE(headless({"--samples", "4", "--size", "64x48", "--quiet"}));
+  CHECK_FALSE(headless({"--reference", "64"}));
   CHECK_FALSE(headless({"--split", "b.ini", "--fullscreen"}));
   CHECK_FALSE(headless({"--screenshot", "a.png", "--window-size", "640x480", "--scale", "2"}));
   CHECK(headless({"--headless"}));

@@ -41,6 +41,28 @@ class FakeDemo : public Demo {
   float weight = 0.1f;
 };
 
+/// One that knows when its picture is complete, with a scene of its own and something to say.
+class CompletingDemo : public FakeDemo {
+ public:
+  std::string default_scene() const override { return "teapot"; }
+  /// Of ripe fruit as many samples as there are.
+  std::optional<int> samples() const override { return ripe ? std::optional(count) : std::nullopt; }
+  bool add_sample(Film& film, const SampleRequest& request) override {
+    for (std::size_t i = 0; i < std::size_t{film.tiling().width} * film.tiling().height; ++i)
+      film.pixels()[i] = film.pixels()[i] + vec4(1);
+    if (request.index == 0) sour_ = 0;
+    ++sour_;
+    return true;
+  }
+  std::vector<std::string> remarks() const override {
+    if (fruit != Fruit::plum) return {};
+    return {std::to_string(sour_) + " plums were sour"};
+  }
+
+ private:
+  int sour_ = 0;
+};
+
 /// Any finite float: all magnitudes alike, and both zeros.
 inline float any_float(Random& random, float most = 3e38f) {
   if (random.index(16) == 0) return random.index(2) != 0 ? 0.0f : -0.0f;

@@ -97,6 +97,13 @@ class Bits {
     for (const Material& m : scene.materials)
       for (const vec3& colour : {m.diffuse, m.specular, m.emission, m.reflection, m.transmission})
         add(colour);
+    for (const Material& m : scene.materials)
+      if (m.absorption != vec3(0)) add(m.absorption), add(vec3(m.refraction_index));
+    for (const Plane& plane : scene.planes) add(plane.normal), add(vec3(plane.offset)), add(plane.material);
+    for (const Texture& texture : scene.textures)
+      for (const u8vec4& t : texture.levels[0].bytes)
+        add(std::uint64_t{t.x} | std::uint64_t{t.y} << 8 | std::uint64_t{t.z} << 16 |
+            std::uint64_t{t.w} << 24);
     for (const Light& light : scene.lights) add(light.position), add(light.direction), add(light.intensity);
   }
   std::uint64_t value() const { return hash_; }
@@ -121,8 +128,16 @@ std::string refusal(const std::string& name) {
   return "";
 }
 
-const std::vector<std::string> scenes = {"teaset",  "teapot", "cornell_box", "sphereflake", "torus_knot",
-                                         "terrain", "pri",    "dist",        "alexandra",   "extreme"};
+/// The words for what feature scenes show.
+std::vector<std::string> feature_words() {
+  for (const MadeScene& made : made_scenes())
+    if (made.name == std::string("feature")) return made.parameters[0].words;
+  return {};
+}
+
+const std::vector<std::string> scenes = {"teaset",  "teapot",  "cornell_box", "sphereflake", "torus_knot",
+                                         "terrain", "pri",     "dist",        "alexandra",   "still_life",
+                                         "loggia",  "feature", "extreme"};
 
 }  // namespace
 
@@ -152,6 +167,12 @@ TEST_CASE("made scenes have the same bits everywhere") {
       {"dist:number=2", 0x8545cda4c45145e7},
       {"dist:number=3", 0x413106c253c49c9f},
       {"alexandra", 0x216817026b117bd2},
+      {"still_life", 0x1fccbe294267a20a},
+      {"still_life:quads=3", 0xfbffe00d8c4aa20c},
+      {"loggia", 0x3b7ed413be8e1cff},
+      {"loggia:textures=64", 0x89087fd8807bcbb2},
+      {"loggia:textures=0", 0xee1690fe8e9c0a8f},
+      {"feature", 0x6ab717f3343c0d42},
       {"extreme", 0x2892815d32265d35},
   };
   // The extreme cases as one.
@@ -160,6 +181,12 @@ TEST_CASE("made scenes have the same bits everywhere") {
     cases = Random::mixed(cases ^ Bits(load_scene("extreme:case=" + std::to_string(i))).value());
   INFO(std::hex << cases);
   CHECK(cases == 0x1c1a21f0c979b99);
+  // The features as one.
+  std::uint64_t features = 0;
+  for (const std::string& word : feature_words())
+    features = Random::mixed(features ^ Bits(load_scene("feature:case=" + word)).value());
+  INFO(std::hex << features);
+  CHECK(features == 0x7205c8585c7db45d);
   for (const auto& [name, bits] : expected) {
     const std::uint64_t found = Bits(load_scene(name)).value();
     std::ostringstream line;
@@ -243,7 +270,8 @@ TEST_CASE("every made scene is sound, lit and in view") {
     }
     CHECK(hits >= width * height / 8);
     const Box box = bounds(scene);
-    CHECK(nearest > 0.05 * glm::length(box.size()));
+    // The loggia's floor goes to the horizon: it is a room of some five metres.
+    CHECK(nearest > 0.05 * (name == "loggia" ? 10 : glm::length(box.size())));
   }
 }
 
@@ -283,6 +311,11 @@ TEST_CASE("parameters are taken strictly") {
       {"pri:number=6", "out of range"},
       {"dist:number=4", "out of range"},
       {"alexandra:number=1", "it has none"},
+      {"still_life:quads=1", "out of range"},
+      {"loggia:textures=-1", "out of range"},
+      {"loggia:textures=4096", "out of range"},
+      {"feature:case=glasses", "it takes matte, "},
+      {"feature:case=1000", "out of range"},
       {"extreme:case=slivers_", "it takes ordinary, "},
       {"extreme:case=-1", "it takes ordinary, "},
       {"extreme:case=1000", "out of range"},
@@ -329,6 +362,10 @@ TEST_CASE("made scenes are as large as they say beforehand") {
                                   "teapot:quads=31",
                                   "teaset:quads=2",
                                   "teaset:quads=31",
+                                  "still_life:quads=2",
+                                  "still_life:quads=20",
+                                  "loggia:textures=0",
+                                  "loggia:textures=64",
                                   "hall:textures=64,detail=1",
                                   "hall:textures=0,detail=12,bays=40",
                                   "hall:textures=0,detail=26,bays=3"};
@@ -856,6 +893,260 @@ TEST_CASE("the elephant is closed, symmetric, and stands on its feet") {
   int lonely = 0;
   for (const auto& p : points) lonely += !points.contains({p[0], p[1], -p[2] + 0.0f});
   CHECK(lonely < 20);  // roundings fall to either side
+}
+
+// ---- what the second chapter shows ---------------------------------------------------
+
+namespace {
+
+/// The mesh with one vertex a place.
+Mesh welded(const Mesh& mesh) {
+  Mesh result;
+  result.name = mesh.name;
+  std::map<std::array<float, 3>, std::uint32_t> numbers;
+  for (const uvec3& t : mesh.triangles) {
+    uvec3 mine;
+    for (int i = 0; i < 3; ++i) {
+      const vec3 p = mesh.positions[t[i]] + 0.0f;  // −0 is 0
+      const auto [at, added] =
+          numbers.insert({{p.x, p.y, p.z}, static_cast<std::uint32_t>(result.positions.size())});
+      if (added) result.positions.push_back(p);
+      mine[i] = at->second;
+    }
+    result.triangles.push_back(mine);
+  }
+  return result;
+}
+
+bool transmits(const Scene& scene, const Mesh& mesh) {
+  return std::any_of(mesh.materials.begin(), mesh.materials.end(),
+                     [&](std::uint32_t m) { return scene.materials[m].transmission != vec3(0); });
+}
+
+/// From the point to the triangle (Ericson, Real-Time Collision Detection, 5.1.5).
+double distance(const dvec3& p, const dvec3& a, const dvec3& b, const dvec3& c) {
+  const auto to_segment = [&](const dvec3& from, const dvec3& to) {
+    const dvec3 way = to - from;
+    const double t = std::clamp(glm::dot(p - from, way) / glm::dot(way, way), 0.0, 1.0);
+    return glm::length(from + t * way - p);
+  };
+  const dvec3 n = glm::cross(b - a, c - a);
+  const bool above = glm::dot(glm::cross(b - a, p - a), n) >= 0 &&
+                     glm::dot(glm::cross(c - b, p - b), n) >= 0 && glm::dot(glm::cross(a - c, p - c), n) >= 0;
+  if (above) return std::abs(glm::dot(p - a, n)) / glm::length(n);
+  return std::min({to_segment(a, b), to_segment(b, c), to_segment(c, a)});
+}
+
+double distance(const dvec3& p, const Mesh& mesh) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const uvec3& t : mesh.triangles)
+    least = std::min(least, distance(p, corner(mesh, t, 0), corner(mesh, t, 1), corner(mesh, t, 2)));
+  return least;
+}
+
+double distance(const Mesh& from, const Mesh& to) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const vec3& p : welded(from).positions) least = std::min(least, distance(dvec3(p), to));
+  return least;
+}
+
+/// Is it within the closed mesh? By the solid angle of its triangles (Van Oosterom & Strackee 1983).
+bool is_inside(const dvec3& p, const Mesh& mesh) {
+  double sum = 0;
+  for (const uvec3& t : mesh.triangles) {
+    const dvec3 a = corner(mesh, t, 0) - p, b = corner(mesh, t, 1) - p, c = corner(mesh, t, 2) - p;
+    const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
+    sum += 2 * std::atan2(glm::dot(a, glm::cross(b, c)),
+                          la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb);
+  }
+  return std::abs(sum) > 2 * pi;
+}
+
+std::set<std::string> feature_names(const std::string& scene) {
+  const std::vector<std::string> names = load_scene(scene).features.names();
+  return {names.begin(), names.end()};
+}
+
+}  // namespace
+
+// Catches: a seam, a lid or a bottom of glass left open, a facet turned over: rays would lose count of what
+// they are in.
+TEST_CASE("what transmits is closed, and its front is outside") {
+  std::vector<std::string> all = {"still_life", "still_life:quads=2", "cornell_box:spheres=1"};
+  for (const std::string& word : feature_words()) all.push_back("feature:case=" + word);
+  int solids = 0;
+  for (const std::string& name : all) {
+    const Scene scene = load_scene(name);
+    for (const Mesh& mesh : scene.meshes) {
+      if (!transmits(scene, mesh)) continue;
+      INFO(name << " " << mesh.name);
+      CHECK(std::set<std::uint32_t>(mesh.materials.begin(), mesh.materials.end()).size() == 1);
+      CHECK(open_edges(welded(mesh)) == 0);
+      CHECK(volume(mesh) > 0);
+      if (!mesh.normals.empty()) CHECK(normals_agree(mesh));
+      ++solids;
+    }
+  }
+  CHECK(solids == 2 * 3 + 1 + 5);
+  for (const char* name : {"tumbler", "water", "gem"})
+    CHECK(transmits(load_scene("still_life"), mesh_of(load_scene("still_life"), name)));
+}
+
+// Catches: surfaces of two media in one place, water with air around it, a straw in the glass's wall, balls
+// that cut each other or the board.
+TEST_CASE("in the still life nothing touches but water and glass") {
+  const Scene scene = load_scene("still_life");
+  const Mesh &tumbler = mesh_of(scene, "tumbler"), &water = mesh_of(scene, "water");
+  CHECK(distance(water, tumbler) > 0.015);
+  CHECK(distance(tumbler, water) > 0.015);
+  const Box around = bounds(tumbler);
+  const dvec3 axis = 0.5 * (dvec3(around.lower) + dvec3(around.upper));
+  int wet = 0;
+  for (const vec3& p : welded(water).positions) {
+    const bool at_edge = std::hypot(p.x - axis.x, p.z - axis.z) > 0.1;
+    const bool on_top = p.y == bounds(water).upper.y;
+    // Its sides and its bottom are in the glass, and so is the edge of its top.
+    if (at_edge || !on_top) CHECK(is_inside(dvec3(p), tumbler));
+    wet += at_edge;
+  }
+  CHECK(wet >= 40);
+  CHECK_FALSE(is_inside(dvec3(axis.x, bounds(water).upper.y, axis.z), tumbler));
+
+  const Mesh& straw = mesh_of(scene, "straw");
+  CHECK(open_edges(welded(straw)) == 0);
+  CHECK(volume(straw) > 0);
+  CHECK(distance(straw, tumbler) > 0.005);
+  for (const vec3& p : straw.positions) CHECK_FALSE(is_inside(dvec3(p), tumbler));
+  CHECK(is_inside(dvec3(straw.positions[0]), water));
+  CHECK(bounds(straw).upper.y > bounds(tumbler).upper.y);
+
+  for (const char* name : {"tumbler", "gem"})
+    for (const Mesh& other : scene.meshes)
+      if (other.name != name && other.name != "water" && other.name != "straw") {
+        INFO(name << " " << other.name);
+        CHECK(distance(mesh_of(scene, name), other) > 0.003);
+      }
+  std::size_t nested = 0;
+  for (std::size_t i = 0; i < scene.spheres.size(); ++i) {
+    const Sphere& a = scene.spheres[i];
+    INFO(i);
+    for (std::size_t j = 0; j < i; ++j) {
+      const Sphere& b = scene.spheres[j];
+      const double apart = glm::length(dvec3(a.centre) - dvec3(b.centre));
+      const bool inside = apart + std::min(a.radius, b.radius) < double(std::max(a.radius, b.radius)) - 0.01;
+      CHECK((inside || apart > double(a.radius) + b.radius + 0.003));
+      nested += inside;
+    }
+    for (const Mesh& mesh : scene.meshes) {
+      INFO(mesh.name);
+      CHECK(distance(dvec3(a.centre), mesh) > double(a.radius) + 0.003);
+      if (transmits(scene, mesh)) CHECK_FALSE(is_inside(dvec3(a.centre), mesh));
+    }
+    for (const Plane& plane : scene.planes)
+      CHECK(glm::dot(dvec3(plane.normal), dvec3(a.centre)) - plane.offset > a.radius);
+  }
+  CHECK(nested == 1);
+}
+
+// Catches: a showpiece that no longer shows what the chapter teaches, or takes more triangles than every ray
+// can ask.
+TEST_CASE("the showpieces show what they are for") {
+  const Scene scene = load_scene("still_life");
+  CHECK(feature_names("still_life") ==
+        std::set<std::string>{"normals", "materials", "mirrors", "glass", "emission", "spheres", "planes",
+                              "point_lights", "directional_lights", "spot_lights", "environment"});
+  CHECK(scene.triangle_count() <= 4000);
+  CHECK(scene.views.size() >= 3);
+  const auto any = [](const Scene& of, const auto& is_so) {
+    return std::any_of(of.materials.begin(), of.materials.end(), is_so);
+  };
+  CHECK(any(scene, [](const Material& m) { return m.transmission != vec3(0) && m.reflection != vec3(0); }));
+  CHECK(any(scene, [](const Material& m) { return m.transmission != vec3(0) && m.absorption != vec3(0); }));
+  for (const Material& m : scene.materials) {  // no surface gives more than it gets
+    INFO(m.name);
+    CHECK(glm::all(glm::lessThanEqual(m.reflection + m.transmission, vec3(1))));
+  }
+
+  const Scene loggia = load_scene("loggia");
+  CHECK(feature_names("loggia") == std::set<std::string>{"normals", "texture_coordinates", "materials",
+                                                         "textures", "alpha", "mirrors", "emission", "bumps",
+                                                         "spheres", "point_lights", "directional_lights",
+                                                         "spot_lights", "environment"});
+  CHECK(loggia.triangle_count() <= 3000);
+  CHECK(loggia.views.size() >= 3);
+  CHECK(any(loggia, [](const Material& m) { return bool(m.diffuse_map); }));
+  CHECK(any(loggia, [](const Material& m) { return bool(m.specular_map) && m.specular != vec3(0); }));
+  CHECK(any(loggia, [](const Material& m) { return bool(m.normal_map); }));
+  CHECK(any(loggia, [](const Material& m) { return bool(m.bump_map); }));
+  CHECK(any(loggia, [](const Material& m) { return bool(m.opacity_map) && m.alpha_cutoff > 0; }));
+  CHECK(any(loggia, [](const Material& m) { return bool(m.opacity_map) && m.alpha_cutoff == 0; }));
+  for (const Material& m : loggia.materials)
+    for (const Map* map : {&m.diffuse_map, &m.specular_map, &m.normal_map, &m.bump_map, &m.opacity_map})
+      CHECK(map->texture < static_cast<int>(loggia.textures.size()));
+  for (const Mesh& mesh : loggia.meshes) {
+    INFO(mesh.name);
+    CHECK(mesh.texture_coordinates.size() == mesh.positions.size());
+    CHECK(normals_agree(mesh, 0.99));
+  }
+  // Without textures it has their mean colours; a chapter that wants none makes none.
+  const Scene plain = load_scene("loggia:textures=0");
+  CHECK_FALSE((plain.features.textures || plain.features.alpha || plain.features.bumps));
+  CHECK(plain.images_not_read == 0);
+  LoadOptions options;
+  options.textures = false;
+  const Scene unread = load_scene("loggia", options);
+  CHECK(unread.textures.empty());
+  CHECK(unread.images_not_read == loggia.textures.size());
+  CHECK(Bits(unread).value() == Bits(plain).value());
+}
+
+// Catches: a feature scene that needs other code as well, so that what was dropped is not known, or none.
+TEST_CASE("a feature scene has one feature more than the plain one") {
+  const std::map<std::string, std::set<std::string>> more = {
+      {"matte", {}},
+      {"lights", {}},
+      {"directional", {"directional_lights"}},
+      {"spot", {"spot_lights"}},
+      {"ambient", {}},
+      {"highlight", {}},
+      {"mirror", {"mirrors"}},
+      {"glass", {"glass"}},
+      {"mirror_and_glass", {"mirrors", "glass"}},
+      {"absorption", {"glass"}},
+      {"nested", {"glass"}},
+      {"smooth", {"normals"}},
+      {"instances", {"instances"}},
+      {"spheres", {"spheres"}},
+      {"planes", {"planes"}},
+      {"environment", {"environment"}},
+      {"emission", {"emission"}},
+      {"texture", {"textures", "texture_coordinates"}},
+      {"specular_map", {"textures", "texture_coordinates"}},
+      {"normal_map", {"textures", "texture_coordinates", "bumps"}},
+      {"bump", {"textures", "texture_coordinates", "bumps"}},
+      {"alpha", {"textures", "texture_coordinates", "alpha"}},
+      {"opacity", {"alpha"}},
+      {"opacity_map", {"textures", "texture_coordinates", "alpha"}}};
+  const std::set<std::string> plain = feature_names("feature");
+  CHECK(plain == std::set<std::string>{"materials", "point_lights"});
+  for (const std::string& word : feature_words()) {
+    INFO(word);
+    REQUIRE(more.contains(word));
+    const std::string name = "feature:case=" + word;
+    std::set<std::string> expected = more.at(word);
+    expected.insert(plain.begin(), plain.end());
+    CHECK(feature_names(name) == expected);
+    const Scene scene = load_scene(name);
+    CHECK(scene.triangle_count() < 200);
+    CHECK(scene.lights.size() == (word == "lights" || word == "directional" || word == "spot" ? 2 : 1));
+    CHECK((word == "ambient") == (scene.ambient != vec3(0)));
+    CHECK((word == "nested") == (std::count_if(scene.meshes.begin(), scene.meshes.end(),
+                                               [&](const Mesh& m) { return transmits(scene, m); }) == 2));
+  }
+  CHECK(feature_words().size() == more.size());
+  CHECK(is_inside(dvec3(0, 1.2, 0.7), mesh_of(load_scene("feature:case=nested"), "block")));
+  for (const vec3& p : mesh_of(load_scene("feature:case=nested"), "air").positions)
+    CHECK(is_inside(dvec3(p), mesh_of(load_scene("feature:case=nested"), "block")));
 }
 
 // ---- extreme cases and tea ----------------------------------------------------------

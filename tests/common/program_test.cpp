@@ -94,6 +94,7 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
       {"--scene good.obj --sweep test=plane,plane", 2, "twice"},
       {"--scene good.obj --sweep test=plane --sweep test=watertight", 2, "twice"},
       {"--scene good.obj --headless --split bad.ini", 2, "--headless"},
+      {"--scene good.obj --output a.png --reference 64", 2, "--reference"},
       {"--scene good.obj --output a.png --split bad.ini", 2, "--split"},
       {"--scene good.obj --time 1 --fullscreen", 2, "--time"},
       {"--scene good.obj --json --screenshot a.png", 2, "--json"},

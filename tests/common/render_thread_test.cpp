@@ -246,8 +246,9 @@ Film headless(const MakeDemo& make, const Wanted& wanted, const Wanted::Side& si
   demo->build(*wanted.scene, side.backend);
   Film film(side.backend, width, height);
   for (int k = 0; k < std::max(samples, 1); ++k)
-    demo->add_sample(film, {wanted.camera, static_cast<std::uint32_t>(k), samples > 0 && wanted.jittered,
-                            wanted.seed, 1e9, [](double) { return true; }});
+    demo->add_sample(
+        film, {wanted.camera, static_cast<std::uint32_t>(k), samples > 0 && wanted.jittered && !side.centred,
+               wanted.seed, 1e9, [](double) { return true; }});
   if (display) *display = demo->display();
   return film;
 }
@@ -717,6 +718,48 @@ TEST_CASE("more samples go on from those that are there, fewer begin again") {
   }
 }
 
+// Catches: a side that gets more samples than complete it, fewer, or those of the other; one that is never
+// done, or not compared; an only sample that is jittered.
+TEST_CASE("sides are complete with samples of their own") {
+  Workshop workshop;
+  Told told(fakes(workshop));
+  Wanted wanted = wish({side_of(told.make, {{"tint", "2"}}), side_of(told.make)}, 12);
+  const auto check = [&](int a, int b) {
+    const std::uint64_t generation = told.finish(wanted);
+    INFO(a << " and " << b);
+    REQUIRE(within(20, [&] { return told.thread.activity().what == "done"; }));
+    CHECK(told.thread.picture().generation == generation);
+    CHECK(told.thread.picture().sides[0]->samples == a);
+    CHECK(told.thread.picture().sides[1]->samples == b);
+    CHECK(told.fault_of_picture() == "");
+  };
+  wanted.sides[0].most_samples = 5;
+  check(5, 12);
+  wanted.sides[0].most_samples = 7;  // goes on
+  const double ms = told.thread.figures(0).render_ms;
+  check(7, 12);
+  CHECK(told.thread.figures(0).render_ms > ms);
+  wanted.sides[0].most_samples = 2;  // begins again
+  check(2, 12);
+  wanted.sides[1].most_samples = 40;  // more than are wanted
+  check(2, 12);
+  std::swap(wanted.sides[0], wanted.sides[1]);
+  check(12, 2);
+  wanted.sides[1].most_samples = 1;
+  wanted.sides[1].centred = true;
+  check(12, 1);
+  const auto centred = told.thread.picture().sides[1]->pixels.to_vector(Backend::cpu);
+  wanted.sides[1].centred = false;
+  check(12, 1);
+  CHECK(told.thread.picture().sides[1]->pixels.to_vector(Backend::cpu) != centred);
+  wanted.difference = true;
+  check(12, 1);
+  CHECK(within(20, [&] {
+    const auto comparison = told.thread.comparison();
+    return comparison && comparison->samples == std::array<int, 2>{12, 1} && comparison->measures.size() == 5;
+  }));
+}
+
 // Catches: settings of no effect that cost a build or samples, or that a frame does not name.
 TEST_CASE("a setting of no effect loses nothing, and is in the next frame") {
   Workshop workshop;
@@ -910,7 +953,7 @@ TEST_CASE("a pixel is inspected soon, also within a long sample") {
     std::mutex mutex;
     Inspection inspection;
     const auto asked = Clock::now();
-    told.thread.inspect(0, k, 9, [&](const Inspection& what) {
+    told.thread.inspect(0, wanted.camera, wanted.width, wanted.height, k, 9, [&](const Inspection& what) {
       const std::lock_guard lock(mutex);
       inspection = what;
       done = true;
@@ -922,6 +965,116 @@ TEST_CASE("a pixel is inspected soon, also within a long sample") {
     CHECK(inspection.facts[1].second == "6");
   }
   CHECK(told.thread.figures(0).samples == 0);  // else it was no long sample
+}
+
+// Catches: a request that is dropped without an answer; an answer by another camera than that of the picture.
+TEST_CASE("what is asked of a pixel is answered, whatever is wanted meanwhile") {
+  Workshop workshop;
+  Told told(fakes(workshop));
+  Wanted wanted = wish({side_of(told.make)}, 2);
+  told.finish(wanted);
+  const auto ask = [&](int side, const Camera& camera) {
+    std::atomic<bool> done{false};
+    Inspection inspection;
+    told.thread.inspect(side, camera, 96, 64, 5, 9, [&](const Inspection& what) {
+      inspection = what;
+      done = true;
+    });
+    wanted.camera.eye.x += 1;
+    told.want(wanted);
+    REQUIRE(within(10, [&] { return done.load(); }));
+    return inspection.facts;
+  };
+  Camera camera;
+  camera.eye.x = 7;
+  for (int k = 0; k < 20; ++k) CHECK(ask(0, camera)[1].second == "7");
+  CHECK(ask(1, camera)[0].first == "not known");
+  wanted.sides[0] = side_of(told.make, {{"fails", "building"}});
+  told.want(wanted);
+  REQUIRE(within(10, [&] { return !told.thread.figures(0).failure.empty(); }));
+  CHECK(ask(0, camera)[0].second == "this scene cannot be built");
+  wanted.paused = true;
+  wanted.sides[0] = side_of(told.make, {{"tint", "3"}});
+  told.want(wanted);
+  CHECK(ask(0, camera)[0].first == "not known");
+}
+
+// Catches: a pause within a sample that ends all following of wishes; one that is broken off and lost.
+TEST_CASE("a pause within a sample follows wishes, and loses nothing") {
+  Workshop workshop;
+  workshop.ns_per_pixel = 12000 * thread_count();  // 70 ms a sample: too short to be broken off
+  Told told(fakes(workshop));
+  Wanted wanted = wish({side_of(told.make), side_of(told.make, {{"tint", "2"}})}, 40);
+  told.want(wanted);
+  REQUIRE(within(30, [&] { return told.thread.figures(1).samples == 2; }));
+  sleep_ms(30);
+  wanted.paused = true;
+  told.want(wanted);
+  REQUIRE(within(5, [&] { return told.thread.activity().what == "paused"; }));
+  wanted.sides.pop_back();
+  const auto generation = told.want(wanted);
+  CHECK(within(5, [&] { return told.thread.picture().sides.size() == 1; }));
+  CHECK(told.thread.activity().generation == generation);
+  CHECK(told.thread.figures(0).samples >= 2);
+  workshop.ns_per_pixel = 0;
+  wanted.paused = false;
+  told.finish(wanted);
+  CHECK(told.fault_of_picture() == "");
+}
+
+// Catches: a fine image that becomes coarse where its samples begin again.
+TEST_CASE("an image that is fine stays fine where fewer samples are wanted") {
+  Workshop workshop;
+  workshop.ns_per_pixel = 100000 * thread_count();  // 600 ms a sample, with coarse films before it
+  Told told(fakes(workshop));
+  Wanted wanted = wish({side_of(told.make)}, 2);
+  told.finish(wanted);
+  wanted.samples = 1;
+  const auto generation = told.want(wanted);
+  int coarsest = 1;
+  REQUIRE(within(20, [&] {
+    coarsest = std::max(coarsest, told.thread.picture().sides[0]->shrink);
+    return told.is_complete(generation) && told.thread.picture().sides[0]->samples == 1;
+  }));
+  CHECK(coarsest == 1);
+}
+
+// Catches: a reference that is waited for and never comes; an error that hides that the reference is of other
+// settings, or says so where the settings are only less exact; points of a curve whose reference is gone.
+TEST_CASE("a reference says why there is none, and of what it is") {
+  Workshop workshop;
+  Told told(fakes(workshop));
+  Wanted wanted = wish({side_of(told.make, {{"counts", "true"}})}, 4);
+  wanted.reference_samples = 16;
+  told.want(wanted);
+  CHECK(within(
+      10, [&] { return told.thread.activity().reference_failure.find("heat map") != std::string::npos; }));
+  wanted.sides[0] = side_of(told.make, {{"fails", "building"}});
+  told.want(wanted);
+  CHECK(within(
+      10, [&] { return told.thread.activity().reference_failure.find("no picture") != std::string::npos; }));
+  wanted.sides = {side_of(told.make, {{"gain", "2"}}),
+                  side_of(told.make, {{"noise", "0.2"}, {"label", "3"}})};
+  told.want(wanted);
+  REQUIRE(within(
+      20, [&] { return !told.thread.figures(0).errors.empty() && !told.thread.figures(1).errors.empty(); }));
+  CHECK(told.thread.activity().reference_failure == "");
+  CHECK(told.thread.figures(0).reference_differs == "");  // the gain is what make_exact changes
+  CHECK(told.thread.figures(1).reference_differs == "noise 0.1");
+
+  wanted.width = wanted.height = 700;  // to be measured more slowly than rendered
+  wanted.samples = 200;
+  for (int k = 0; k < 3; ++k) {
+    wanted.reference_samples = 4;
+    told.want(wanted);
+    REQUIRE(within(30, [&] { return told.thread.figures(0).errors.size() > 1; }));
+    wanted.reference_samples = 0;
+    const auto generation = told.want(wanted);
+    REQUIRE(within(5, [&] { return told.thread.activity().generation == generation; }));
+    sleep_ms(300);
+    CHECK(told.thread.figures(0).errors.empty());
+    wanted.camera.eye.x += 1;
+  }
 }
 
 // Catches: lines of another level, or that stay when none are wanted.

@@ -860,6 +860,165 @@ TEST_CASE("a scene's warnings are told, some of them") {
   CHECK_FALSE(told[0].error);
 }
 
+namespace {
+
+/// Samples that take as long as some frames of a window.
+class SlowDemo : public CompletingDemo {
+ public:
+  bool add_sample(Film& film, const SampleRequest& request) override {
+    std::this_thread::sleep_for(2ms);
+    if (!request.keep_going(0.5)) return false;
+    std::this_thread::sleep_for(5ms);
+    return CompletingDemo::add_sample(film, request);
+  }
+};
+
+/// A session of demos that know when their picture is complete, of 64×48 pixels.
+template <class OfDemo = CompletingDemo>
+std::unique_ptr<Session> open_completing(const Options& options) {
+  CompletingDemo demo;
+  Settings settings;
+  demo.declare_settings(settings);
+  auto session =
+      std::make_unique<Session>([] { return std::make_unique<OfDemo>(); }, options, settings.texts(), [] {});
+  session->set_size(64, 48);
+  return session;
+}
+
+/// Lets it render until all that is wanted is there. Returns the samples of each side.
+std::vector<int> completed(Session& session) {
+  const auto start = std::chrono::steady_clock::now();
+  for (;;) {
+    settle(session);
+    const Picture picture = session.renderer().picture();
+    std::vector<int> samples;
+    for (const auto& frame : picture.sides)
+      if (frame && frame->complete) samples.push_back(frame->samples);
+    if (picture.generation == session.generation() && session.renderer().activity().what == "done" &&
+        samples.size() == static_cast<std::size_t>(session.side_count()))
+      return samples;
+    REQUIRE(std::chrono::steady_clock::now() - start < 60s);
+  }
+}
+
+std::size_t count_of(const Session& session, const std::string& words) {
+  std::size_t n = 0;
+  for (const Notice& notice : session.notices()) n += notice.text.find(words) != std::string::npos;
+  return n;
+}
+
+}  // namespace
+
+// Catches: another scene than the chapter's where none is named: at first, or asked for by an empty name; a
+// command that another chapter's default would change.
+TEST_CASE("where no scene is named, the chapter's is shown") {
+  Desk desk;
+  Options options;
+  options.backend = Backend::cpu;
+  const auto session = open_completing(options);
+  session->pause(true);
+  CHECK(session->opening() == "teapot");
+  settle(*session);
+  CHECK(session->scene()->name == "teapot");
+  CHECK(Read(session->flags(0)).options.scene == "teapot");
+  session->open_scene("a scene.json");
+  settle(*session);
+  CHECK(session->scene()->name == "a scene");
+  session->open_scene("");
+  settle(*session);
+  CHECK(session->scene()->name == "teapot");
+}
+
+// Catches: samples beyond those that complete a picture, or fewer; a window that is not done with them; a
+// number that stays when a setting changes it, or goes into a preset; a side that takes the other's number.
+TEST_CASE("a window asks for no more samples than the settings make complete") {
+  Desk desk;
+  Options options;
+  options.backend = Backend::cpu;
+  const auto session = open_completing(options);
+  session->set(0, "ripe", "true");
+  session->set(0, "count", "4");
+  CHECK(completed(*session) == std::vector<int>{4});
+  CHECK(session->samples() == window_samples);
+  CHECK_FALSE(Read(session->flags(0)).options.samples);
+  REQUIRE(session->save_preset(0, "of four"));
+  session->set(0, "count", "9");
+  CHECK(completed(*session) == std::vector<int>{9});
+  session->set(0, "count", "2");
+  CHECK(completed(*session) == std::vector<int>{2});
+
+  session->set_samples(6);
+  session->split(true);
+  session->set(1, "ripe", "false");
+  CHECK(completed(*session) == std::vector<int>{2, 6});
+  CHECK(Read(session->flags(1)).options.samples == 6);
+  session->set(0, "count", "7");  // fewer are wanted than would complete it
+  CHECK(completed(*session) == std::vector<int>{6, 6});
+  CHECK(Read(session->flags(0)).options.samples == 6);
+  session->swap_sides();
+  session->set(1, "count", "3");
+  CHECK(completed(*session) == std::vector<int>{6, 3});
+  session->split(false);
+  session->set_samples(50);
+  session->load_preset(0, "of four");
+  CHECK(completed(*session) == std::vector<int>{4});
+  CHECK(session->samples() == 50);
+}
+
+// Catches: a window and a file that take a picture's only sample through different points.
+TEST_CASE("a picture that one sample completes has it in the pixel's centre, unless told otherwise") {
+  Desk desk;
+  for (const bool jitter : {false, true}) {
+    Options options;
+    options.backend = Backend::cpu;
+    options.jitter = jitter;
+    const auto session = open_completing(options);
+    session->set(0, "ripe", "true");
+    for (const char* count : {"1", "4"}) {
+      session->set(0, "count", count);
+      session->update();
+      const Read read(session->flags(0));
+      CompletingDemo demo;
+      Settings settings;
+      demo.declare_settings(settings);
+      settings.set_texts(read.settings.texts());
+      const int samples = file_samples(read.options, demo);
+      const Wanted& wanted = session->wanted();
+      CHECK(samples == std::stoi(count));
+      CHECK((wanted.jittered && !wanted.sides[0].centred) == is_jittered(read.options, samples));
+    }
+  }
+}
+
+// Catches: what the samples met kept from the user, or told again with each of them.
+TEST_CASE("what the samples met is told once") {
+  Desk desk;
+  Options options;
+  options.backend = Backend::cpu;
+  options.samples = 40;
+  const auto session = open_completing<SlowDemo>(options);
+  completed(*session);
+  CHECK(count_of(*session, "plums") == 0);
+  session->set(0, "fruit", "plum's \"own\", #1");
+  completed(*session);
+  session->update();
+  CHECK(session->renderer().figures(0).remarks == std::vector<std::string>{"40 plums were sour"});
+  REQUIRE(count_of(*session, " plums were sour") == 1);
+  const auto told_at = session->notices().back().at;
+  session->set_camera(dollied(session->camera(), 0.9f), false);
+  completed(*session);
+  session->update();
+  CHECK(count_of(*session, " plums were sour") == 1);
+  CHECK(session->notices().back().at == told_at);
+  session->split(true);
+  session->set(0, "fruit", "apple");
+  completed(*session);
+  session->update();
+  CHECK(count_of(*session, "B: ") == 1);
+  CHECK(count_of(*session, "A: ") == 0);
+  CHECK(session->renderer().figures(0).remarks.empty());
+}
+
 // Catches: an image that is not saved, that replaces another, or of which nobody says where it is.
 TEST_CASE("an image is saved under a name that is free") {
   Desk desk;

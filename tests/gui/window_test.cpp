@@ -6,6 +6,7 @@
 #include "common/image/files.h"
 #include "common/math/statistics.h"
 #include "tests/gui/driver.h"
+#include "tests/gui/painting_demo.h"
 
 using namespace trilha;
 using namespace trilha::testing;
@@ -176,6 +177,93 @@ TEST_CASE("every widget of the panel over its range") {
   }
 }
 
+// Catches: a widget beside the chapter's settings that does nothing, changes another thing, or leaves its
+// range.
+TEST_CASE("every other widget over its range") {
+  Studio studio;
+  Driver driver({"--scene", "teapot", "--backend", "cpu", "--window-size", "1200x1200", "--samples", "2"},
+                [&] { return std::make_unique<PaintingDemo>(studio); });
+  Session& session = driver.session();
+  REQUIRE(driver.until_complete());
+  const auto slide = [&](const std::string& name, double low, double high,
+                         const std::function<double()>& value) {
+    INFO(name);
+    const PixelRect r = driver.widget(name);
+    const double y = r.y + r.height / 2.0;
+    driver.drag(r.x + r.height + 60, y, r.x - 20, y);
+    CHECK(value() == Approx(low));
+    driver.drag(r.x + r.height + 60, y, r.x + r.width + 40, y);
+    CHECK(value() == Approx(high));
+  };
+  // backends: one that is not here changes nothing
+  driver.click("backend A cuda", 0.1);
+  CHECK((session.side(0).backend == Backend::cuda) == session.why_not(Backend::cuda).empty());
+  driver.click("backend A cpu", 0.1);
+  CHECK(session.side(0).backend == Backend::cpu);
+  slide("slider structure", -1, 3, [&] { return session.overlay_level(); });
+  session.set_overlay_level(-1);
+  session.set(0, "count", "70");
+  driver.frames(2);
+  const PixelRect count = driver.widget("setting A count");
+  driver.click(count.x - 98, count.y + count.height / 2, 3);
+  CHECK(session.side(0).settings["count"].text() == "40");
+  driver.click("heading Left out", 0.3);
+  driver.frames(3);
+  driver.click("button Measure");
+  REQUIRE(driver.until([&] {
+    const auto left_out = session.renderer().figures(0).left_out;
+    return !left_out.empty() && left_out[0].ms.has_value();
+  }));
+  // the reference, by its own slider
+  driver.click("heading Error against a reference", 0.3);
+  driver.frames(3);
+  const auto reference = [&] {
+    driver.click("button Make reference");
+    const int samples = session.reference_samples();
+    driver.click("button Make reference");
+    CHECK(session.reference_samples() == 0);
+    return samples;
+  };
+  slide("slider reference", 16, 16384, reference);
+
+  // the menu of views
+  const Camera first = session.camera();
+  driver.click("menu View");
+  driver.frames(3);
+  slide("slider Field of view", 1, 150, [&] { return session.camera().field_of_view; });
+  driver.click("check Fly", 0.05);
+  driver.click("check Fly", 0.05);
+  const PixelRect speed = driver.widget("slider Speed");
+  driver.drag(speed.x + 90, speed.y + 8, speed.x + speed.width + 40, speed.y + 8);
+  driver.drag(speed.x + 90, speed.y + 8, speed.x - 20, speed.y + 8);
+  driver.click("text view");
+  driver.type("mine");
+  driver.click("button Save this view");
+  REQUIRE(session.views().size() >= 1);
+  const Camera kept = session.camera();
+  driver.click("view reset");
+  CHECK(session.camera().field_of_view == first.field_of_view);
+  driver.click("menu View");
+  driver.frames(3);
+  driver.click("view mine");
+  CHECK(session.camera().field_of_view == kept.field_of_view);
+
+  // the menu of scenes
+  const auto open = [&](const std::string& widget, const std::string& typed, const std::string& name) {
+    INFO(widget);
+    driver.click("menu Scene");
+    driver.frames(3);
+    if (!typed.empty()) {
+      driver.click("text scene");
+      driver.type(typed);
+    }
+    driver.click(widget);
+    CHECK(driver.until([&] { return session.scene()->name == name && session.opening().empty(); }, 20));
+  };
+  open("scene cornell_box", "", "cornell_box");
+  open("button Open", "teapot", "teapot");
+}
+
 // Catches: a camera that does not follow the hand, or does after the hand has let go; a click that turns; a
 // pixel that is asked but not shown.
 TEST_CASE("the mouse turns, moves and asks") {
@@ -319,6 +407,7 @@ TEST_CASE("the window answers while every core renders") {
       driver.session().renderer().activity().cancel_ms);
   CHECK(times.frame.size() > 100);
   CHECK(at(times.frame, 0.5) < 50);
+  CHECK(at(times.frame, 0.99) < 100);
   CHECK(times.latency.size() > 50);
   CHECK(at(times.latency, 0.5) < 150);
 }
@@ -352,6 +441,21 @@ TEST_CASE("a first scene that is refused ends the program with its reason") {
       run("/usr/bin/env", folder, "DISPLAY=" + display.name() + " '" + program() + "' --scene missing.obj");
   CHECK(result.code == 1);
   CHECK(result.err.find("missing.obj") != std::string::npos);
+}
+
+// Catches: a picture that is waited for though the renderer has refused it, or a reference that cannot be.
+TEST_CASE("what is refused ends a screenshot with its reason") {
+  Folder folder;
+  for (const auto& [flags, reason] : {std::pair{"--eye 1,1,1 --target 1,1,1", "eye is at its target"},
+                                      {"--shading tests --reference 4", "a heat map"}}) {
+    const Result result = run("/usr/bin/timeout", folder,
+                              std::string("30 '") + program() + "' --scene teapot --backend cpu " + flags +
+                                  " --screenshot {}/window.png --window-size 500x300");
+    INFO(result.err);
+    CHECK(result.code == 1);
+    CHECK(result.err.find(reason) != std::string::npos);
+    CHECK_FALSE(fs::exists(folder / "window.png"));
+  }
 }
 
 // Catches: a picture of the window without its panel or its image.

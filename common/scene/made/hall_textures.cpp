@@ -434,6 +434,25 @@ HallTexels hall_texels(HallTexture which, int size) {
   return result;
 }
 
+HallHeights hall_heights(HallTexture which, int size) {
+  std::vector<double> heights(std::size_t(size) * std::size_t(size));
+  tbb::parallel_for(0, size, [&](int y) {
+    for (int x = 0; x < size; ++x)
+      heights[std::size_t(y) * std::size_t(size) + std::size_t(x)] =
+          entry(which).at((x + 0.5) / size, 1 - (y + 0.5) / size).height;
+  });
+  const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+  const double range = *high - *low;
+  HallHeights result;
+  result.range = float(range);
+  result.texels.reserve(heights.size());
+  for (const double height : heights) {
+    const std::uint8_t byte = in_a_byte(range > 0 ? (height - *low) / range : 0);
+    result.texels.emplace_back(byte, byte, byte, 255);
+  }
+  return result;
+}
+
 vec3 hall_mean_colour(HallTexture which) {
   constexpr int size = 32;
   dvec3 sum(0);

@@ -43,6 +43,14 @@ struct HallTexels {
 };
 HallTexels hall_texels(HallTexture which, int size);
 
+/// The heights of the same surface, for bump maps: grey, from 0 where it is lowest to 255 where it is
+/// highest, which is `range` metres above.
+struct HallHeights {
+  std::vector<u8vec4> texels;
+  float range = 0;
+};
+HallHeights hall_heights(HallTexture which, int size);
+
 /// About the mean of the colours in linear light, for materials that go without textures.
 vec3 hall_mean_colour(HallTexture which);
 

@@ -1,0 +1,301 @@
+#include "chapters/02_whitted/renderer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/parallel/algorithms.h"
+#include "common/parallel/bands.h"
+#include "common/parallel/for_each.h"
+
+namespace trilha {
+namespace {
+
+/// Ray i against one primitive.
+template <class Test>
+struct MeetsPrimitive {
+  ShadingView view;
+  bool surely_ahead;
+  const Ray* rays;
+  const std::uint32_t* primitives;
+  std::uint8_t* met;
+
+  TRILHA_HD void operator()(std::size_t i) const {
+    const std::uint32_t p = primitives[i];
+    const Ray ray = rays[i];
+    Hit hit;
+    hit.t = ray.t_max;
+    if (p < view.triangle_count()) {
+      const Corners<vec3> corners = view.corners(p);
+      float numbers[Test::numbers];
+      Test::prepare(corners.a, corners.b, corners.c, numbers);
+      const Triangles<Test> alone{numbers, 1, false, surely_ahead};
+      alone.intersect(0, ray, alone.constants(ray), hit);
+      met[i] = hit.found() ? 1 : 0;
+      return;
+    }
+    if (p - view.spheres.first < view.spheres.count)
+      view.spheres.intersect(p - view.spheres.first, ray, hit);
+    else if (p - view.planes.first < view.planes.count)
+      view.planes.intersect(p - view.planes.first, ray, {}, hit);
+    met[i] = hit.found() ? 1 : 0;
+  }
+};
+
+/// What came back of a band, counted: the rays, and from bit 44 on, the trees that overflowed.
+struct CountRays {
+  const vec4* colours;
+  std::uint64_t* counts;
+  TRILHA_HD void operator()(std::size_t i) const {
+    const float w = colours[i].w;
+    counts[i] = static_cast<std::uint64_t>(std::fabs(w)) + (w < 0 ? std::uint64_t{1} << 44 : 0);
+  }
+};
+
+struct ShowRays {
+  vec4* colours;
+  TRILHA_HD void operator()(std::size_t i) const {
+    colours[i] = vec4(vec3(std::fabs(colours[i].w)), colours[i].w);
+  }
+};
+
+struct AddToFilm {
+  Tiling tiling;
+  std::size_t first;
+  const vec4* colours;
+  Show show;
+  vec4* film;
+  TRILHA_HD void operator()(std::size_t i) const {
+    const auto pixel = tiling.pixel(i);
+    if (!tiling.inside(pixel)) return;
+    const vec4& colour = colours[i - first];
+    const vec3 value = show == Show::samples ? vec3(1) : vec3(colour);
+    film[tiling.offset(pixel)] += vec4(value, 1);
+  }
+};
+
+struct AddPixels {
+  Tiling tiling;
+  std::size_t first;
+  const vec4* pixels;
+  Show show;
+  vec4* film;
+  TRILHA_HD void operator()(std::size_t i) const {
+    const auto pixel = tiling.pixel(i);
+    if (!tiling.inside(pixel)) return;
+    const vec4& of = pixels[i - first];
+    film[tiling.offset(pixel)] += vec4(show == Show::samples ? vec3(of.w) : vec3(of), 1);
+  }
+};
+
+}  // namespace
+
+// ---- brute force -------------------------------------------------------------
+
+BruteForceTracer::BruteForceTracer(const WhittedScene& scene, TriangleTest test, const Stream& stream)
+    : stream_(stream), test_(test), view_(scene.view()) {
+  const auto fill = [&](Among among, const PrimitiveCounts& begin, const PrimitiveCounts& end) {
+    Part& part = parts_[static_cast<int>(among)];
+    part.first = begin.triangles;
+    part.count = end.triangles - begin.triangles;
+    part.spheres = {view_.spheres.spheres + begin.spheres, end.spheres - begin.spheres,
+                    view_.spheres.first + begin.spheres};
+    part.planes = {view_.planes.planes + begin.planes, end.planes - begin.planes,
+                   view_.planes.first + begin.planes};
+    with_test(test_, [&](auto chosen) {
+      part.numbers = prepare_triangles<decltype(chosen), float>(stream_, Loop::blocked, scene.positions(),
+                                                                scene.triangles() + part.first, part.count);
+    });
+  };
+  const PrimitiveCounts all{view_.triangle_count(), view_.spheres.count, view_.planes.count};
+  fill(Among::all, {}, all);
+  const PrimitiveCounts& opaque = scene.opaque();
+  parted_ = opaque.triangles + opaque.spheres + opaque.planes != all.triangles + all.spheres + all.planes;
+  if (parted_) {
+    fill(Among::opaque, {}, opaque);
+    fill(Among::clear, opaque, all);
+  }
+}
+
+void BruteForceTracer::closest(Among among, const Ray* rays, Hit* hits, std::size_t n) const {
+  const Part& of = part(among);
+  with_test(test_, [&](auto chosen) {
+    const Triangles<decltype(chosen)> triangles{of.numbers.data(), of.count, false, surely_ahead_};
+    trace_triangles(stream_, Loop::blocked, triangles, rays, hits, n);
+  });
+  if (of.first + of.spheres.count + of.planes.count > 0)
+    for_each(stream_, n, TraceBodies{of.first, of.spheres, of.planes, rays, hits});
+}
+
+void BruteForceTracer::occluded(Among among, const Ray* rays, std::uint8_t* occluded, std::size_t n) const {
+  const Part& of = part(among);
+  with_test(test_, [&](auto chosen) {
+    const Triangles<decltype(chosen)> triangles{of.numbers.data(), of.count, false, surely_ahead_};
+    occluded_triangles(stream_, Loop::blocked, triangles, rays, occluded, n);
+  });
+  if (of.spheres.count + of.planes.count > 0)
+    for_each(stream_, n, TraceOccludedBodies{of.spheres, of.planes, rays, occluded});
+}
+
+void BruteForceTracer::meets(const Ray* rays, const std::uint32_t* primitives, std::uint8_t* met,
+                             std::size_t n) const {
+  with_test(test_, [&](auto chosen) {
+    for_each(stream_, n, MeetsPrimitive<decltype(chosen)>{view_, surely_ahead_, rays, primitives, met});
+  });
+}
+
+// ---- building ----------------------------------------------------------------
+
+WhittedRenderer::WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream)
+    : settings_(settings), stream_(stream), scene_(scene, settings, stream), split_(stream) {
+  const bool general = settings.keep.general_kernel || !settings.specialise;
+  features_ = general ? feature::every : scene_.features();
+  const std::uint32_t count = scene_.triangle_count();
+  if (settings.kernel == Kernel::split)
+    tracer_ = std::make_unique<BruteForceTracer>(scene_, settings.test, stream_);
+  else if (settings.kernel == Kernel::fused)
+    numbers_ = prepare_triangles<Watertight, float>(stream_, Loop::plain, scene_.positions(),
+                                                    scene_.triangles(), count);
+  else
+    rt_gpu_ = std::make_unique<RtGpu>(scene_, settings.kernel, settings.block_width, settings.block_height,
+                                      stream_);
+  stream_.synchronize();
+}
+
+WhittedRenderer::~WhittedRenderer() = default;
+
+// ---- rendering ---------------------------------------------------------------
+
+void WhittedRenderer::colours(const Ray* rays, vec4* colours, std::size_t n) {
+  if (n == 0) return;
+  Timer timer(stream_);
+  if (settings_.kernel == Kernel::split) {
+    tracer_->set_surely_ahead(surely_ahead(settings_.terms));
+    split_.colours(scene_.view(), *tracer_, settings_.terms, features_, settings_.shadow_cache, rays, colours,
+                   n);
+  } else if (settings_.kernel == Kernel::fused) {
+    const ShadingView& view = scene_.view();
+    fused_colours(stream_, view,
+                  {{{numbers_.data(), view.triangle_count(), false, surely_ahead(settings_.terms)}},
+                   view.spheres,
+                   view.planes},
+                  settings_.terms, features_, rays, colours, n);
+    times_.trees += timer.milliseconds();
+  } else {
+    rt_gpu_->colours(settings_.terms, rays, colours, n);
+    times_.trees += timer.milliseconds();
+  }
+  std::uint64_t* counts = counts_.at_least(stream_.backend(), n);
+  for_each(stream_, n, CountRays{colours, counts});
+  const std::uint64_t total = reduce(stream_, counts, n, std::uint64_t{0}, Sum{});
+  rays_ += static_cast<double>(total & ((std::uint64_t{1} << 44) - 1));
+  overflows_ += total >> 44;
+  if (settings_.show == Show::rays) for_each(stream_, n, ShowRays{colours});
+}
+
+std::optional<KernelCost> WhittedRenderer::kernel_cost() const {
+  if (rt_gpu_ != nullptr) return rt_gpu_->cost();
+  return settings_.kernel == Kernel::fused ? fused_cost(stream_, features_) : split_.shading_cost(features_);
+}
+
+Hit WhittedRenderer::trace(const Ray& ray) const {
+  const Buffer<Ray> rays(stream_, {ray});
+  Buffer<Hit> hits(stream_.backend(), 1);
+  if (tracer_ != nullptr) {
+    tracer_->closest(Among::all, rays.data(), hits.data(), 1);
+  } else {
+    const BruteForceTracer tracer(scene_, TriangleTest::watertight, stream_);
+    tracer.closest(Among::all, rays.data(), hits.data(), 1);
+  }
+  return hits.to_vector(stream_)[0];
+}
+
+bool WhittedRenderer::add_sample(Film& film, const Camera& camera, std::uint32_t sample, std::uint64_t seed,
+                                 double band_ms, const std::function<bool(double)>& keep_going) {
+  const Tiling& tiling = film.tiling();
+  const auto pinhole =
+      PinholeCamera::make(camera, static_cast<int>(tiling.width), static_cast<int>(tiling.height));
+  settings_.terms.pixel_angle = static_cast<float>(
+      2 * std::tan(glm::radians(double(camera.field_of_view)) / 2) / std::max(tiling.height, 1u));
+  return settings_.antialiasing == Antialiasing::adaptive
+             ? add_adaptive(film, pinhole, band_ms, keep_going)
+             : add_pattern(film, pinhole, sample, seed, band_ms, keep_going);
+}
+
+bool WhittedRenderer::add_pattern(Film& film, const PinholeCamera& camera, std::uint32_t sample,
+                                  std::uint64_t seed, double band_ms,
+                                  const std::function<bool(double)>& keep_going) {
+  const Tiling& tiling = film.tiling();
+  // A band is a number of 8×4-pixel tiles: so small that many triangles fill no more than its time.
+  constexpr std::size_t group = 32;
+  const bool device = stream_.backend() == Backend::cuda;
+  const std::size_t most = std::min<std::size_t>(tiling.size(), (device ? 4096 : 64) * Tiling::tile_size);
+  // until it is known: a tree of ten rays, each asking all
+  const double tests_per_ms = device ? 1e8 : 1e6;
+  const double guess =
+      indices_per_ms_ > 0 ? indices_per_ms_ : tests_per_ms / (10.0 * (scene_.triangle_count() + 10));
+  const double first = std::clamp(band_ms * guess / group, 1.0, static_cast<double>(most / group));
+  return for_each_band(
+      stream_, tiling.size() / group, static_cast<std::size_t>(first), most / group, band_ms,
+      [&](std::size_t first_group, std::size_t end_group) {
+        const std::size_t begin = first_group * group, end = end_group * group, n = end - begin;
+        Timer band_timer(stream_), rays_timer(stream_);
+        Ray* rays = sample_rays_.at_least(stream_.backend(), n);
+        vec4* out = colours_.at_least(stream_.backend(), n);
+        for_each(stream_, {begin, end},
+                 SampleRays{camera, tiling, begin, settings_.antialiasing,
+                            static_cast<std::uint32_t>(settings_.across), sample, seed,
+                            settings_.terms.farthest, rays});
+        times_.rays += rays_timer.milliseconds();
+        colours(rays, out, n);
+        Timer film_timer(stream_);
+        for_each(stream_, {begin, end}, AddToFilm{tiling, begin, out, settings_.show, film.pixels()});
+        times_.film += film_timer.milliseconds();
+        indices_per_ms_ = static_cast<double>(n) / std::max(band_timer.milliseconds(), 1e-3);
+      },
+      keep_going);
+}
+
+bool WhittedRenderer::add_adaptive(Film& film, const PinholeCamera& camera, double band_ms,
+                                   const std::function<bool(double)>& keep_going) {
+  const Tiling& tiling = film.tiling();
+  const Backend backend = stream_.backend();
+  const float farthest = settings_.terms.farthest;
+  const std::size_t most = backend == Backend::cuda ? 2048 : 16;  // tiles in a band
+  return for_each_band(
+      stream_, tiling.tiles(), backend == Backend::cuda ? 64 : 1, most, band_ms,
+      [&](std::size_t first_tile, std::size_t end_tile) {
+        const std::size_t tiles = end_tile - first_tile, corners = tiles * CornerRays::corners;
+        std::size_t n = tiles * Tiling::tile_size;
+        Ray* rays = sample_rays_.at_least(backend, corners);
+        vec4* seen = colours_.at_least(backend, corners);
+        for_each(stream_, corners, CornerRays{camera, tiling, first_tile, farthest, rays});
+        colours(rays, seen, corners);
+        Square* squares = squares_.at_least(backend, n);
+        vec4* pixels = pixels_.at_least(backend, n);
+        for_each(stream_, n, PixelSquares{tiling, first_tile, seen, squares, pixels});
+        float side = 1;
+        for (int level = 0; n > 0; ++level, side /= 2) {
+          std::uint8_t* flags = flags_.at_least(backend, n);
+          std::uint32_t* chosen = chosen_.at_least(backend, n);
+          // at the last level nothing is unlike enough
+          const float threshold = level < settings_.adaptive_depth ? settings_.threshold : 2.0f;
+          for_each(stream_, n, Unlike{squares, threshold, flags});
+          for_each(stream_, n, AddWhole{squares, flags, n, side * side, pixels});
+          const std::size_t count = compact(stream_, flags, n, chosen);
+          rays = sample_rays_.at_least(backend, 5 * count);
+          seen = colours_.at_least(backend, 5 * count);
+          for_each(stream_, 5 * count, QuarterRays{camera, tiling, side, farthest, squares, chosen, rays});
+          colours(rays, seen, 5 * count);
+          Square* quarters = next_squares_.at_least(backend, 4 * count);
+          for_each(stream_, count, Quarters{squares, chosen, seen, side, quarters});
+          std::swap(squares_, next_squares_);
+          squares = squares_.data();
+          n = 4 * count;
+        }
+        for_each(stream_, {first_tile * Tiling::tile_size, end_tile * Tiling::tile_size},
+                 AddPixels{tiling, first_tile * Tiling::tile_size, pixels, settings_.show, film.pixels()});
+      },
+      keep_going);
+}
+
+}  // namespace trilha

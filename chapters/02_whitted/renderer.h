@@ -1,0 +1,115 @@
+#pragma once
+// Brings the chapter together: builds what the settings need of a scene, makes rays for samples, has their
+// trees followed by the chosen kernel, and adds what comes back to a film.
+
+#include <functional>
+#include <memory>
+
+#include "chapters/02_whitted/antialiasing.h"
+#include "chapters/02_whitted/fused.h"
+#include "chapters/02_whitted/rt_gpu.h"
+#include "chapters/02_whitted/split.h"
+#include "chapters/02_whitted/whitted_scene.h"
+
+namespace trilha {
+
+/// Brute force over a scene's triangles by chapter 01's loops, and over its spheres and planes.
+class BruteForceTracer final : public Tracer {
+ public:
+  BruteForceTracer(const WhittedScene& scene, TriangleTest test, const Stream& stream);
+
+  /// Are hits only those that are beyond the error of their t?
+  void set_surely_ahead(bool surely_ahead) { surely_ahead_ = surely_ahead; }
+
+  bool any_clear() const override { return parted_; }
+  void closest(Among among, const Ray* rays, Hit* hits, std::size_t n) const override;
+  void occluded(Among among, const Ray* rays, std::uint8_t* occluded, std::size_t n) const override;
+  void meets(const Ray* rays, const std::uint32_t* primitives, std::uint8_t* met,
+             std::size_t n) const override;
+
+ private:
+  /// Some of the primitives; those of each kind lie together.
+  struct Part {
+    std::uint32_t first = 0, count = 0;  ///< of its triangles
+    Spheres<float> spheres{};
+    Planes<float> planes{};
+    Buffer<float> numbers;
+  };
+  const Part& part(Among among) const {
+    return parts_[static_cast<int>(among == Among::opaque && !parted_ ? Among::all : among)];
+  }
+
+  Stream stream_;
+  TriangleTest test_;
+  ShadingView view_;
+  bool surely_ahead_ = true;
+  bool parted_ = false;  ///< else all is opaque
+  Part parts_[3];
+};
+
+class WhittedRenderer {
+ public:
+  /// Throws what WhittedScene does, DeviceError if the backend is missing, Cancelled in work that was
+  /// cancelled.
+  WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream);
+  ~WhittedRenderer();
+
+  /// Adds sample number `sample` to every pixel; of the adaptive method, all of it. keep_going(fraction) is
+  /// asked after each band of about band_ms ms. Returns false if stopped early. Throws Cancelled in work that
+  /// was cancelled; the film is then not to be read.
+  bool add_sample(Film& film, const Camera& camera, std::uint32_t sample, std::uint64_t seed, double band_ms,
+                  const std::function<bool(double)>& keep_going);
+
+  /// Ray i of n → the light that comes along it, and fourth the rays of its tree, shadow rays among them.
+  /// Both arrays lie on the stream's backend.
+  void colours(const Ray* rays, vec4* colours, std::size_t n);
+
+  /// The nearest hit of a ray of the host.
+  Hit trace(const Ray& ray) const;
+
+  /// Settings that need no rebuild: the terms' numbers and the pattern.
+  void set(const WhittedSettings& settings) { settings_ = settings; }
+
+  /// What the kernel that shades, of those that are not split the one kernel, takes of a CUDA device; nothing
+  /// on the CPU.
+  std::optional<KernelCost> kernel_cost() const;
+
+  const WhittedScene& scene() const { return scene_; }
+  const Stream& stream() const { return stream_; }
+  unsigned features() const { return features_; }  ///< of the kernel that runs
+  double rays() const { return rays_; }
+  /// Trees in which a ray was in more glass bodies than Media holds.
+  std::uint64_t overflows() const { return overflows_; }
+  const ShadowCacheCounts& cache_counts() const { return split_.cache_counts(); }
+  WhittedTimes times() const {
+    WhittedTimes all = split_.times();
+    all.rays = times_.rays, all.trees = times_.trees, all.film = times_.film;
+    return all;
+  }
+
+ private:
+  bool add_pattern(Film& film, const PinholeCamera& camera, std::uint32_t sample, std::uint64_t seed,
+                   double band_ms, const std::function<bool(double)>& keep_going);
+  bool add_adaptive(Film& film, const PinholeCamera& camera, double band_ms,
+                    const std::function<bool(double)>& keep_going);
+
+  WhittedSettings settings_;
+  Stream stream_;
+  WhittedScene scene_;
+  unsigned features_;
+  std::unique_ptr<BruteForceTracer> tracer_;
+  Buffer<float> numbers_;  ///< of the triangles, for the fused kernel
+  std::unique_ptr<RtGpu> rt_gpu_;
+  SplitTrees split_;
+  WhittedTimes times_;
+  double rays_ = 0, indices_per_ms_ = 0;
+  std::uint64_t overflows_ = 0;
+  Scratch<Ray> sample_rays_;
+  Scratch<vec4> colours_, pixels_;
+  Scratch<std::uint64_t> counts_;
+  Scratch<Square> squares_, next_squares_;
+  Scratch<std::uint8_t> flags_;
+  Scratch<std::uint32_t> chosen_;
+};
+
+}  // namespace trilha

@@ -1,0 +1,350 @@
+#include "chapters/02_whitted/demo.h"
+
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "common/parallel/cancellation.h"
+#include "common/scene/made/solids.h"
+#include "tests/lessons.h"
+#include "tests/whitted.h"
+
+using namespace trilha;
+using namespace trilha::testing;
+
+namespace {
+
+/// All that a setting can change: smooth, textured and thin triangles, glass that absorbs, a mirror, a ball,
+/// a plane, two lamps, ambient light and light from beyond; what is textured is small in the picture.
+Scene rich_scene() {
+  Material floor, ball, shiny = mirror(vec3(0.4f)), glass = clear(1.5f, vec3(0.9f), vec3(0.1f, 0.4f, 0.6f)),
+                        leaf, lamp = glowing({0.2f, 0.1f, 0});
+  shiny.specular = vec3(0.5f);
+  shiny.shininess = 20;
+  ball.specular = vec3(0.4f);
+  ball.shininess = 10;
+  glass.reflection = vec3(0.05f);
+  Scene scene = scene_of({floor, ball, shiny, glass, leaf, lamp});
+  std::vector<u8vec4> texels;
+  for (int k = 0; k < 64; ++k)
+    texels.push_back((k / 8 + k) % 2 ? u8vec4(255, 200, 90, 255) : u8vec4(60, 80, 160, 60));
+  scene.textures = {make_texture("chequer", 8, 8, texels, TextureUse::colour),
+                    make_texture("leaf", 8, 8, texels, TextureUse::data)};
+  scene.materials[0].diffuse_map.texture = 0;
+  scene.materials[0].diffuse_map.scale = {3, 3};
+  scene.materials[4].opacity_map.texture = 1;
+  scene.materials[4].opacity_map.channel = 3;
+  add_parallelogram(scene, {-4, 0, 3}, {8, 0, 0}, {0, 0, -8}, 0);
+  scene.meshes.push_back(smooth_icosphere(1, 0.7, {-1.3, 0.7, 0}));
+  scene.meshes.back().materials.assign(80, 1);
+  Mesh box = box_mesh({0.8, 0.01, -1}, {1.8, 1.2, 0}, 3);
+  scene.meshes.push_back(box);
+  add_parallelogram(scene, {-0.5, 0.1, 1.2}, {0.8, 0, 0}, {0, 0.8, 0}, 4);
+  for (Mesh& mesh : scene.meshes) {
+    if (mesh.normals.empty()) make_normals(mesh);
+    if (mesh.texture_coordinates.empty()) mesh.texture_coordinates.assign(mesh.positions.size(), vec2(0));
+  }
+  add_parallelogram(scene, {-3, 0.2, -3}, {6, 0, 0}, {0, 2, 0}, 2);
+  scene.meshes.back().normals.assign(4, vec3(0, 0, 1));
+  scene.spheres = {{{0.1f, 1.5f, -0.8f}, 0.5f, 5}};
+  scene.planes = {{{0, 1, 0}, -0.5f, 1}};
+  scene.lights = {lamp_at({2, 4, 3}, vec3(12)), lamp_at({-3, 3, 1}, {4, 5, 6}, {1, 0.5f, 0})};
+  scene.ambient = vec3(0.1f);
+  scene.environment.colour = {0.2f, 0.25f, 0.3f};
+  scene.camera.eye = {0.2f, 1.8f, 4.5f};
+  scene.camera.target = {0, 0.7f, 0};
+  scene.camera.field_of_view = 48;
+  scene.features = features_of(scene);
+  return scene;
+}
+
+constexpr int width = 24, height = 18;
+
+/// A demo with its settings, at a depth that tests can afford.
+struct Subject {
+  std::unique_ptr<Demo> demo = make_whitted_demo();
+  Settings settings;
+  Subject() {
+    demo->declare_settings(settings);
+    settings["depth"].set_text("4");
+  }
+  void build(const Scene& scene, const Stream& stream = Backend::cpu) { demo->build(scene, stream); }
+  std::vector<vec3> sample(const Scene& scene, std::uint32_t index = 0, const Stream& stream = Backend::cpu) {
+    Film film(stream, width, height);
+    demo->add_sample(film, {scene.camera, index, false, 3, 1000, [](double) { return true; }});
+    return film.image(stream).pixels;
+  }
+  /// All samples that complete it.
+  std::vector<vec3> picture(const Scene& scene) {
+    build(scene);
+    Film film(Backend::cpu, width, height);
+    for (int k = 0; k < demo->samples().value(); ++k)
+      demo->add_sample(
+          film, {scene.camera, static_cast<std::uint32_t>(k), false, 3, 1000, [](double) { return true; }});
+    return film.image(Backend::cpu).pixels;
+  }
+};
+
+/// Texts worth trying of a setting.
+std::vector<std::string> texts_of(const Setting& setting) {
+  switch (setting.kind) {
+    case Setting::Kind::flag:
+      return {"true", "false"};
+    case Setting::Kind::choice: {
+      std::vector<std::string> all;
+      for (const Choice& choice : setting.choices) all.push_back(choice.name);
+      return all;
+    }
+    case Setting::Kind::integer:
+      return {std::to_string(int(setting.low)), std::to_string(int(setting.low) + 3)};
+    default:
+      return {"0.02", "0.37"};
+  }
+}
+
+}  // namespace
+
+// Catches: a heading that was renamed, a setting that is explained nowhere.
+TEST_CASE("02: every setting is explained by the lesson") {
+  if (!std::filesystem::exists(root_folder() / "chapters" / "02_whitted" / "README.md"))
+    skip("there is no lesson yet");
+  check_lessons(*make_whitted_demo());
+}
+
+// Catches: a name that two settings share, a value that does not read back, a range that refuses its ends.
+TEST_CASE("02: settings read back what they say") {
+  Subject subject, other;
+  std::set<std::string> names;
+  for (const Setting& setting : subject.settings.all()) {
+    INFO("--" << setting.name);
+    CHECK(names.insert(setting.name).second);
+    std::vector<std::string> texts = texts_of(setting);
+    if (setting.kind == Setting::Kind::integer || setting.kind == Setting::Kind::number)
+      for (const double end : {setting.low, setting.high}) {
+        setting.put(end);
+        texts.push_back(setting.text());
+      }
+    for (const std::string& text : texts) {
+      setting.set_text(text);
+      CHECK(setting.text() == text);
+      other.settings.set_texts(subject.settings.texts());
+      CHECK(other.settings.texts() == subject.settings.texts());
+    }
+    setting.set_text(setting.initial_text());
+    CHECK_FALSE(setting.changed());
+    CHECK_THROWS(setting.set_text("no such value"));
+  }
+}
+
+// Catches: a setting that is shown as if it did something where it does not, or as if it did nothing.
+TEST_CASE("02: a setting says whether it changes anything") {
+  const Scene scene = rich_scene();
+  // what else is set, for some settings with a condition to be idle, and to be active
+  struct State {
+    std::vector<std::pair<const char*, const char*>> set;
+  };
+  const State states[] = {{{}},
+                          {{{"shadows", "false"}}},
+                          {{{"smooth", "false"}}},
+                          {{{"maps", "false"}}},
+                          {{{"kernel", "fused"}}},
+                          {{{"kernel", "rt-gpu"}}},
+                          {{{"self-intersection", "fixed"}}},
+                          {{{"antialiasing", "none"}}},
+                          {{{"antialiasing", "grid"}}},
+                          {{{"antialiasing", "jittered"}}},
+                          {{{"antialiasing", "adaptive"}}},
+                          {{{"kernel", "rt-gpu-jm-ir"}, {"self-intersection", "wachter-binder"}}}};
+  std::map<std::string, int> idle, active;
+  for (const State& state : states) {
+    Subject subject;
+    std::string said;
+    for (const auto& [name, text] : state.set) {
+      subject.settings[name].set_text(text);
+      said += std::string(" --") + name + " " + text;
+    }
+    for (const Setting& setting : subject.settings.all()) {
+      if (!setting.applies) continue;
+      INFO("--" << setting.name << ", with" << said);
+      // A cache saves time, tests differ in what they miss: pictures are, and should be, alike.
+      const bool alike = setting.name == "shadow-cache" || setting.name == "test";
+      const std::string before = setting.text();
+      std::vector<std::vector<vec3>> pictures;
+      for (const std::string& text : texts_of(setting)) {
+        setting.set_text(text);
+        pictures.push_back(subject.picture(scene));
+      }
+      setting.set_text(before);
+      bool changes = false;
+      for (const auto& one : pictures) changes = changes || one != pictures[0];
+      if (!setting.active()) {
+        CHECK_FALSE(changes);
+        ++idle[setting.name];
+      } else {
+        if (!alike) CHECK(changes);
+        ++active[setting.name];
+      }
+      CHECK(setting.only.rfind("only with", 0) == 0);
+    }
+  }
+  Subject subject;
+  for (const Setting& setting : subject.settings.all())
+    if (setting.applies) {
+      INFO("--" << setting.name);
+      CHECK(idle[setting.name] > 0);
+      CHECK(active[setting.name] > 0);
+    }
+}
+
+// Catches: a setting that asks for no new build and needs one, so that the old kernel or the old buffers
+// stay, or whose change another build would not notice.
+TEST_CASE("02: what asks for a restart needs no build") {
+  const Scene scene = rich_scene();
+  for (const auto& [kernel, antialiasing] : {std::pair{"split", "low-discrepancy"},
+                                             {"split", "adaptive"},
+                                             {"fused", "none"},
+                                             {"rt-gpu-jm", "none"}}) {
+    Subject warm;
+    warm.settings["kernel"].set_text(kernel);
+    warm.settings["antialiasing"].set_text(antialiasing);
+    warm.settings["self-intersection"].set_text("fixed");
+    warm.build(scene);
+    const std::vector<std::string> initial = warm.settings.texts();
+    for (const Setting& setting : warm.settings.all()) {
+      if (setting.effect == Effect::rebuild) continue;
+      for (const std::string& text : texts_of(setting)) {
+        INFO(kernel << ", " << antialiasing << ", --" << setting.name << " " << text);
+        setting.set_text(text);
+        Subject fresh;
+        fresh.settings.set_texts(warm.settings.texts());
+        fresh.build(scene);
+        CHECK(warm.sample(scene) == fresh.sample(scene));
+        warm.settings.set_texts(initial);
+      }
+    }
+    CHECK(warm.sample(scene) == [&] {
+      Subject fresh;
+      fresh.settings.set_texts(initial);
+      fresh.build(scene);
+      return fresh.sample(scene);
+    }());
+  }
+}
+
+// Catches: a term whose switch changes another term: what is mirrored, by whether shadows are coloured.
+TEST_CASE("02: without shadows, what shadows are like changes nothing") {
+  const Scene scene = rich_scene();
+  for (const char* transmission : {"true", "false"})
+    for (const char* reflection : {"true", "false"}) {
+      INFO("transmission " << transmission << ", reflection " << reflection);
+      std::vector<std::vector<vec3>> pictures;
+      for (const char* coloured : {"true", "false"})
+        for (const char* shadows : {"true", "false"}) {
+          Subject subject;
+          for (const char* local : {"diffuse", "specular"}) subject.settings[local].set_text("false");
+          subject.settings["transmission"].set_text(transmission);
+          subject.settings["reflection"].set_text(reflection);
+          subject.settings["coloured-shadows"].set_text(coloured);
+          subject.settings["shadows"].set_text(shadows);
+          pictures.push_back(subject.picture(scene));
+        }
+      for (const auto& one : pictures) CHECK(one == pictures[0]);
+    }
+}
+
+// Catches: a number of samples that is not the pattern's, a heat map of another kind than its name.
+TEST_CASE("02: samples, and heat maps of them and of rays") {
+  const Scene scene = rich_scene();
+  Subject subject;
+  for (const char* method : {"grid", "jittered", "low-discrepancy"})
+    for (const char* across : {"1", "3", "32"}) {
+      subject.settings["antialiasing"].set_text(method);
+      subject.settings["across"].set_text(across);
+      CHECK(subject.demo->samples() == std::stoi(across) * std::stoi(across));
+    }
+  for (const char* method : {"none", "adaptive"}) {
+    subject.settings["antialiasing"].set_text(method);
+    CHECK(subject.demo->samples() == 1);
+  }
+  CHECK_FALSE(subject.demo->display().heatmap);
+  subject.demo->show_heatmap("samples");  // adaptive
+  subject.settings["adaptive-depth"].set_text("2");
+  CHECK(subject.demo->display().heatmap);
+  CHECK(subject.demo->display().most == 1 + 5 * (1 + 4));
+  float least = 1e9f, most = 0;
+  for (const vec3& p : subject.picture(scene)) least = std::min(least, p.x), most = std::max(most, p.x);
+  CHECK(least == 1);
+  CHECK(most > 5);
+  CHECK(most <= subject.demo->display().most);
+  subject.settings["antialiasing"].set_text("none");
+  subject.demo->show_heatmap("rays");
+  double sum = 0;
+  for (const vec3& p : subject.picture(scene)) {
+    CHECK((p.x >= 1 && p.x == p.y && p.y == p.z && p.x == std::floor(p.x)));
+    sum += p.x;
+  }
+  CHECK(subject.demo->rays() == sum);
+}
+
+// Catches: a reference that is another picture, or not as exact as this chapter can.
+TEST_CASE("02: a reference is the same picture, without what is saved on it") {
+  Subject subject;
+  for (const auto& [name, text] : {std::pair{"test", "plane"},
+                                   {"kernel", "fused"},
+                                   {"fresnel", "schlick"},
+                                   {"diffuse", "false"},
+                                   {"filter", "nearest"},
+                                   {"self-intersection", "none"},
+                                   {"antialiasing", "grid"},
+                                   {"maps", "false"}})
+    subject.settings[name].set_text(text);
+  subject.demo->make_exact();
+  for (const auto& [name, text] : {std::pair{"test", "watertight"},
+                                   {"fresnel", "schlick"},
+                                   {"diffuse", "false"},
+                                   {"self-intersection", "error-bound"},
+                                   {"maps", "false"},
+                                   {"least-contribution", "0"},
+                                   {"depth", "64"}}) {
+    INFO(name);
+    CHECK(subject.settings[name].text() == text);
+  }
+}
+
+// Catches: what one of the old programs cannot show, and does not say.
+TEST_CASE("02: what is not shown is said") {
+  const Scene scene = rich_scene();
+  Subject subject;
+  CHECK(subject.demo->not_shown(scene).empty());
+  for (const char* kernel : {"rt-gpu", "rt-gpu-jm", "rt-gpu-jm-ir"}) {
+    subject.settings["kernel"].set_text(kernel);
+    const auto list = subject.demo->not_shown(scene);
+    REQUIRE(list.size() == 3);
+    for (const std::string& line : list) CHECK(line.find(kernel) != std::string::npos);
+    CHECK_FALSE(subject.demo->reads().textures);
+  }
+}
+
+// Catches: a demo that a cancelled build or sample leaves unusable.
+TEST_CASE("02: after a cancelled build or sample the demo can be built again") {
+  const Scene scene = rich_scene();
+  Subject subject;
+  const auto expected = subject.picture(scene);
+  for (int k = 0; k < 40; ++k) {
+    Random random(2, std::uint64_t(k));
+    Cancellation cancellation;
+    Film film(Backend::cpu, width, height);
+    cancellation.run([&] {
+      if (k % 4 == 0) cancellation.cancel();
+      subject.demo->build(scene, Backend::cpu);
+      int bands = 0;
+      const int stop = int(random.index(10));
+      subject.demo->add_sample(film, {scene.camera, 0, false, 3, 0.05, [&](double) {
+                                        if (++bands > stop) cancellation.cancel();
+                                        return true;
+                                      }});
+    });
+    REQUIRE(subject.picture(scene) == expected);
+  }
+}
