@@ -39,7 +39,18 @@ __device__ __noinline__ HitOf<T> settle_slot(const Triangles<Test, T> triangles,
                                              std::uint32_t i, const RayOf<T> ray, const Constants constants,
                                              HitOf<T> hit) {
   const auto measure = measure_slot<turned, Test>(slot, ray, constants);
-  if (Test::may_hit(measure)) triangles.settle(measure, Numbers<T>{slot}, i, ray, constants, hit);
+  if (!Test::may_hit(measure)) return hit;
+  if constexpr (turned) {  // to settle, a triangle is wanted as it was
+    T numbers[Test::numbers];
+    for (int v = 0; v < Test::numbers; v += 3) {
+      numbers[v + constants.kx] = slot[v];
+      numbers[v + constants.ky] = slot[v + 1];
+      numbers[v + constants.kz] = slot[v + 2];
+    }
+    triangles.settle(measure, Numbers<T>{numbers}, i, ray, constants, hit);
+  } else {
+    triangles.settle(measure, Numbers<T>{slot}, i, ray, constants, hit);
+  }
   return hit;
 }
 

@@ -21,8 +21,8 @@ struct Terms {
   bool smooth = true;            ///< vertex normals where meshes have some
   bool terminator = true;        ///< shadow rays of smooth triangles start where the smooth surface would be
   Fresnel fresnel = Fresnel::exact;
-  int depth = 8;                     ///< secondary rays in a row, at most most_depth
-  float least_contribution = 2e-3f;  ///< branches that count no more in any channel are not followed
+  int depth = 6;                     ///< secondary rays in a row, at most most_depth
+  float least_contribution = 4e-3f;  ///< branches that count no more in any channel are not followed
   SelfIntersection self_intersection = SelfIntersection::error_bound;
   float fixed_offset = 5e-5f;
   float farthest = std::numeric_limits<float>::max();  ///< what is beyond is not seen

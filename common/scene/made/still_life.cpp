@@ -392,7 +392,7 @@ MadeSize size(const Parameters& parameters) {
 std::vector<MadeScene> still_life_scenes() {
   return {{"still_life",
            "glass, water, silver and a mirror on a chequered board, after Whitted's picture",
-           {{"quads", "on a side of the teapot's patches", 5, 2, 20}},
+           {{"quads", "on a side of the teapot's patches", 3, 2, 20}},
            make,
            size}};
 }
