@@ -99,7 +99,7 @@ __device__ inline void test_tile_for_any(const Triangles<Test, T>& triangles, co
 }
 
 template <Query query, class Test, class T>
-__global__ void __launch_bounds__(tile_threads)
+__global__ void __launch_bounds__(tile_threads, 3)
     trace_tiles_kernel(const Triangles<Test, T> triangles, const RayOf<T>* rays,
                        QueryAnswer<query, T>* answers, std::size_t n) {
   constexpr bool watertight = std::is_same_v<Test, Watertight>;

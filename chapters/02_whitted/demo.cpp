@@ -56,8 +56,7 @@ class WhittedDemo final : public Demo {
                      "secondary rays in a row; 0 leaves the eye's rays alone");
     settings.number("least-contribution", t.least_contribution, 0, 1, Effect::restart,
                     "branches that count no more in any channel are not followed");
-    settings.number("farthest", t.farthest, 0, std::numeric_limits<float>::max(), Effect::restart,
-                    "what is beyond is not seen");
+    settings.number("farthest", t.farthest, 0, 1e30f, Effect::restart, "what is beyond is not seen");
     settings.group("Surfaces", "Surfaces");
     settings.flag("smooth", t.smooth, Effect::rebuild, "interpolate the vertex normals that a mesh brings");
     settings.group("Surfaces", "Shadows");

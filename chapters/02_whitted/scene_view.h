@@ -25,7 +25,7 @@ struct Terms {
   float least_contribution = 4e-3f;  ///< branches that count no more in any channel are not followed
   SelfIntersection self_intersection = SelfIntersection::error_bound;
   float fixed_offset = 5e-5f;
-  float farthest = std::numeric_limits<float>::max();  ///< what is beyond is not seen
+  float farthest = 1e30f;  ///< what is beyond is not seen
   TextureFilter filter = TextureFilter::trilinear;
   float pixel_angle = 0;  ///< between the rays of neighbouring pixels, in radians: the width of a ray cone
 };
