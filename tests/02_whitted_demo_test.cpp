@@ -305,7 +305,7 @@ TEST_CASE("02: a reference is the same picture, without what is saved on it") {
                                    {"diffuse", "false"},
                                    {"self-intersection", "error-bound"},
                                    {"maps", "false"},
-                                   {"least-contribution", "0"},
+                                   {"least-contribution", "1e-04"},
                                    {"depth", "64"}}) {
     INFO(name);
     CHECK(subject.settings[name].text() == text);
