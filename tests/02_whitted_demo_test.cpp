@@ -305,8 +305,8 @@ TEST_CASE("02: a reference is the same picture, without what is saved on it") {
                                    {"diffuse", "false"},
                                    {"self-intersection", "error-bound"},
                                    {"maps", "false"},
-                                   {"least-contribution", "1e-04"},
-                                   {"depth", "64"}}) {
+                                   {"least-contribution", "0.001"},
+                                   {"depth", "16"}}) {
     INFO(name);
     CHECK(subject.settings[name].text() == text);
   }

@@ -225,19 +225,24 @@ bool WhittedRenderer::add_pattern(Film& film, const PinholeCamera& camera, std::
                                   std::uint64_t seed, double band_ms,
                                   const std::function<bool(double)>& keep_going) {
   const Tiling& tiling = film.tiling();
-  // A band is a number of 8×4-pixel tiles: so small that many triangles fill no more than its time.
-  constexpr std::size_t group = 32;
+  // A band is a number of 8×4-pixel tiles: so small that many triangles fill no more than its time. A device
+  // is not full with less than some ten thousand rays, and a tree's many launches then take as long for few
+  // as for many.
   const bool device = stream_.backend() == Backend::cuda;
+  const std::size_t group = device ? 64 * Tiling::tile_size : 32;
   const std::size_t most = std::min<std::size_t>(tiling.size(), (device ? 4096 : 64) * Tiling::tile_size);
   // until it is known: a tree of ten rays, each asking all
   const double tests_per_ms = device ? 1e8 : 1e6;
   const double guess =
       indices_per_ms_ > 0 ? indices_per_ms_ : tests_per_ms / (10.0 * (scene_.triangle_count() + 10));
-  const double first = std::clamp(band_ms * guess / group, 1.0, static_cast<double>(most / group));
+  const double first =
+      std::clamp(band_ms * guess / group, 1.0, std::max(static_cast<double>(most / group), 1.0));
   return for_each_band(
-      stream_, tiling.size() / group, static_cast<std::size_t>(first), most / group, band_ms,
+      stream_, (tiling.size() + group - 1) / group, static_cast<std::size_t>(first),
+      std::max<std::size_t>(most / group, 1), band_ms,
       [&](std::size_t first_group, std::size_t end_group) {
-        const std::size_t begin = first_group * group, end = end_group * group, n = end - begin;
+        const std::size_t begin = first_group * group, end = std::min(end_group * group, tiling.size());
+        const std::size_t n = end - begin;
         Timer band_timer(stream_), rays_timer(stream_);
         Ray* rays = sample_rays_.at_least(stream_.backend(), n);
         vec4* out = colours_.at_least(stream_.backend(), n);
