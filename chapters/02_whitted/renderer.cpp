@@ -236,10 +236,10 @@ bool WhittedRenderer::add_pattern(Film& film, const PinholeCamera& camera, std::
   const double guess =
       indices_per_ms_ > 0 ? indices_per_ms_ : tests_per_ms / (10.0 * (scene_.triangle_count() + 10));
   const double first =
-      std::clamp(band_ms * guess / group, 1.0, std::max(static_cast<double>(most / group), 1.0));
+      std::clamp(band_ms * guess / group, 1.0, static_cast<double>((most + group - 1) / group));
   return for_each_band(
       stream_, (tiling.size() + group - 1) / group, static_cast<std::size_t>(first),
-      std::max<std::size_t>(most / group, 1), band_ms,
+      (most + group - 1) / group, band_ms,
       [&](std::size_t first_group, std::size_t end_group) {
         const std::size_t begin = first_group * group, end = std::min(end_group * group, tiling.size());
         const std::size_t n = end - begin;
