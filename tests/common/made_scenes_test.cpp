@@ -1144,9 +1144,9 @@ TEST_CASE("a feature scene has one feature more than the plain one") {
                                                [&](const Mesh& m) { return transmits(scene, m); }) == 2));
   }
   CHECK(feature_words().size() == more.size());
-  CHECK(is_inside(dvec3(0, 1.2, 0.7), mesh_of(load_scene("feature:case=nested"), "block")));
-  for (const vec3& p : mesh_of(load_scene("feature:case=nested"), "air").positions)
-    CHECK(is_inside(dvec3(p), mesh_of(load_scene("feature:case=nested"), "block")));
+  const Scene nested = load_scene("feature:case=nested");
+  CHECK(is_inside(dvec3(0, 1.2, 0.7), mesh_of(nested, "block")));
+  for (const vec3& p : mesh_of(nested, "air").positions) CHECK(is_inside(dvec3(p), mesh_of(nested, "block")));
 }
 
 // ---- extreme cases and tea ----------------------------------------------------------
