@@ -85,7 +85,9 @@ struct Job {
   int side = 0;
   int samples = 0;  ///< that the film will have; where fewer are wanted it is of no use
   bool interruptible =
-      false;  ///< it may be broken off, to be done again, where another side has to show something
+      false;           ///< it may be broken off, to be done again, where another side has to show something
+  bool brief = false;  ///< soon done and then shown, though the camera has moved on: else no picture would
+                       ///< come as long as it moves
   Cancellation cancellation = {};
   std::optional<Clock::time_point> ended_by = {};  ///< when the wish came that ended it
 };
@@ -405,9 +407,17 @@ struct RenderThread::State {
            from.sides == to.sides && to.samples >= from.samples;
   }
 
+  /// Does it ask for the same from elsewhere?
+  static bool is_move(const Wanted& from, const Wanted& to) {
+    Wanted there = from;
+    there.camera = to.camera;
+    return is_harmless(there, to);
+  }
+
   /// Is it to be ended, for another wish?
   bool is_useless(const Job& job, const Wanted& from, const Wanted& to) const {
     if (job.kind == Job::Kind::savings) return true;
+    if (job.brief && is_move(from, to)) return false;
     const auto own = static_cast<std::size_t>(job.side);
     const auto restarts = [&](std::size_t i) { return effect_on(i, from, to) >= Effect::restart; };
     bool another = to.sides.size() > from.sides.size();
@@ -857,6 +867,7 @@ struct RenderThread::State {
     say("rendering", 0, false);
     guarded(side, [&] {
       Job job{Job::Kind::render, static_cast<int>(i), 0, true};
+      job.brief = side.level < 0 && side.ms_per_pixel > 0 && predicted_ms(side, level) <= soon_ms;
       run_job(job, [&] {
         metered(side, [&] {
           if (!has_size(side.spare, width, height)) {

@@ -585,6 +585,28 @@ TEST_CASE("while it moves the image stays coarse, for a while") {
   CHECK(within(30, [&] { return told.is_complete(told.wishes.size() - 1); }));
 }
 
+// Catches: a coarse film that each move ends, so that no picture comes as long as the camera moves; one that
+// goes on though it is of other settings.
+TEST_CASE("a camera that moves faster than pictures come is followed all the same") {
+  require_meaningful_times();
+  Workshop workshop;
+  workshop.ns_per_pixel = 400000;
+  Told told(fakes(workshop));
+  Wanted wanted = wish({side_of(told.make)}, 1);
+  told.finish(wanted);
+  wanted.moving = true;
+  std::set<std::uint64_t> seen;
+  for (int k = 1; k <= 200; ++k) {
+    wanted.camera.eye.x = static_cast<float>(k);
+    told.want(wanted);
+    sleep_ms(5);
+    seen.insert(told.thread.picture().generation);
+  }
+  WARN(seen.size() << " pictures in a second of 200 moves");
+  CHECK(seen.size() > 12);
+  CHECK(within(30, [&] { return told.is_complete(told.wishes.size() - 1); }));
+}
+
 // Catches: a side that takes the other with it; a failure that is not told or that ends the program; one that
 // no later wish mends.
 TEST_CASE("where a side fails it says why, and the other goes on") {
