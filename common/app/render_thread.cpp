@@ -867,7 +867,7 @@ struct RenderThread::State {
     say("rendering", 0, false);
     guarded(side, [&] {
       Job job{Job::Kind::render, static_cast<int>(i), 0, true};
-      job.brief = side.level < 0 && side.ms_per_pixel > 0 && predicted_ms(side, level) <= soon_ms;
+      job.brief = side.level < 0 && side.ms_per_pixel > 0 && predicted_ms(side, level) <= partial_frame_ms;
       run_job(job, [&] {
         metered(side, [&] {
           if (!has_size(side.spare, width, height)) {
