@@ -48,13 +48,28 @@ TRILHA_HD inline Vec2<std::uint32_t> sobol(std::uint32_t k) {
   return {first, second};
 }
 
+/// The k-th cell to be visited of `cells`, all of them before any comes again: a step of the golden section
+/// of their number, made coprime to it, so that the first few are spread over the pixel, too.
+TRILHA_HD inline std::uint32_t visited_cell(std::uint32_t k, std::uint32_t cells) {
+  std::uint32_t step = cells * 5 / 8;
+  for (;; ++step) {
+    std::uint32_t a = cells, b = step;
+    while (b != 0) {
+      const std::uint32_t rest = a % b;
+      a = b;
+      b = rest;
+    }
+    if (a == 1) return k % cells * step % cells;
+  }
+}
+
 /// Sample k of a pixel, in [0, 1)², from its upper left corner. Patterns begin anew after n² samples, those
 /// that are random with other numbers.
 TRILHA_HD inline vec2 sample_point(Antialiasing method, std::uint32_t n, std::uint32_t k, std::uint64_t pixel,
                                    std::uint64_t seed) {
   const std::uint32_t cells = n * n;
   if (method == Antialiasing::grid || method == Antialiasing::jittered) {
-    const std::uint32_t cell = k % cells;
+    const std::uint32_t cell = visited_cell(k, cells);
     float x = 0.5f, y = 0.5f;
     if (method == Antialiasing::jittered) {
       Random random(seed, (static_cast<std::uint64_t>(k) << 32) ^ pixel);
@@ -186,11 +201,13 @@ struct AddWhole {
   const std::uint8_t* quartered;
   std::size_t n;
   float area;  ///< of a square, in pixels
+  bool rays;   ///< adds up what the squares took instead of their light
   vec4* pixels;
 
   TRILHA_HD void operator()(std::size_t i) const {
     const std::uint32_t pixel = squares[i].pixel;
     if (i > 0 && squares[i - 1].pixel == pixel) return;
+    const auto shown = [this](const vec4& seen) { return rays ? vec3(std::fabs(seen.w)) : vec3(seen); };
     vec4 sum = pixels[pixel];
     for (std::size_t k = i; k < n && squares[k].pixel == pixel; ++k) {
       if (quartered[k] != 0) {
@@ -198,7 +215,8 @@ struct AddWhole {
         continue;
       }
       const vec4* seen = squares[k].seen;
-      sum += vec4(vec3((seen[0] + seen[1]) + (seen[2] + seen[3])) * (0.25f * area), 0);
+      sum +=
+          vec4(((shown(seen[0]) + shown(seen[1])) + (shown(seen[2]) + shown(seen[3]))) * (0.25f * area), 0);
     }
     pixels[pixel] = sum;
   }

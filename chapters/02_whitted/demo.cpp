@@ -37,8 +37,11 @@ class WhittedDemo final : public Demo {
     settings
         .flag("shadow-cache", settings_.shadow_cache, Effect::rebuild,
               "neighbours first ask what blocked the first of them")
-        .only_if([this] { return settings_.terms.shadows && settings_.kernel == Kernel::split; },
-                 "only with --shadows and --kernel split");
+        .only_if(
+            [this] {
+              return settings_.terms.shadows && settings_.kernel == Kernel::split && !light_passes();
+            },
+            "only with --shadows and --kernel split, where no glass or alpha lets light through");
     settings.group("Ray tree", "Mirrors and glass");
     settings.flag("reflection", t.reflection, Effect::rebuild,
                   "rays that surfaces mirror; each is a tree of its own");
@@ -353,6 +356,12 @@ class WhittedDemo final : public Demo {
  private:
   static std::string text_of(const vec3& v) {
     return "(" + shown(v.x, 7) + ", " + shown(v.y, 7) + ", " + shown(v.z, 7) + ")";
+  }
+
+  /// Do shadow rays go through what they meet, in the scene that was built last?
+  bool light_passes() const {
+    const unsigned used = scene_ != nullptr ? features_used(*scene_, settings_) : 0;
+    return (used & feature::alpha) != 0 || ((used & feature::glass) != 0 && settings_.terms.coloured_shadows);
   }
 
   /// The name of a primitive's material, for people.

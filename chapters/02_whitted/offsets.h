@@ -14,6 +14,14 @@ enum class SelfIntersection {
   wachter_binder,  ///< moved by some 256 units in the last place of each coordinate
   error_bound      ///< moved by as much as the point can be wrong
 };
+constexpr SelfIntersection all_self_intersections[] = {SelfIntersection::none, SelfIntersection::fixed,
+                                                       SelfIntersection::wachter_binder,
+                                                       SelfIntersection::error_bound};
+/// Its name as the settings have it.
+inline const char* name(SelfIntersection method) {
+  constexpr const char* names[] = {"none", "fixed", "wachter-binder", "error-bound"};
+  return names[static_cast<int>(method)];
+}
 
 /// Wächter & Binder, A Fast and Robust Method for Avoiding Self-Intersection, Ray Tracing Gems 2019, chapter
 /// 6: up to 256 floats on, in the integer order of floats, along each component of the unit vector `side`;

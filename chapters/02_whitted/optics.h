@@ -51,6 +51,12 @@ TRILHA_HD inline bool refracted(const Vec3<T>& d, const Vec3<T>& n, T eta, Vec3<
 /// How the share of reflected light is found: by Fresnel's formulas, by Schlick's polynomial (1994), or not
 /// at all: the coefficients of the material stand as they are (Whitted 1980).
 enum class Fresnel { exact, schlick, constant };
+constexpr Fresnel all_fresnels[] = {Fresnel::exact, Fresnel::schlick, Fresnel::constant};
+/// Its name as the settings have it.
+inline const char* name(Fresnel fresnel) {
+  constexpr const char* names[] = {"exact", "schlick", "constant"};
+  return names[static_cast<int>(fresnel)];
+}
 
 /// Fresnel's share of reflected light without polarisation, in [0, 1], for a surface that is passed: cosines
 /// before and behind it. The amplitudes are

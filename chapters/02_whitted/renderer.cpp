@@ -51,39 +51,28 @@ struct CountRays {
   }
 };
 
-struct ShowRays {
+/// What a tree took, in place of its light: its rays, or itself, a sample.
+struct ShowEffort {
+  Show show;
   vec4* colours;
   TRILHA_HD void operator()(std::size_t i) const {
-    colours[i] = vec4(vec3(std::fabs(colours[i].w)), colours[i].w);
+    const float w = colours[i].w;
+    colours[i] = vec4(vec3(show == Show::rays ? std::fabs(w) : 1.0f), w);
   }
 };
 
+/// A value of every index → its pixel.
 struct AddToFilm {
   Tiling tiling;
   std::size_t first;
-  const vec4* colours;
-  Show show;
+  const vec4* values;
+  bool fourth;  ///< shows the fourth number of a value instead of its light
   vec4* film;
   TRILHA_HD void operator()(std::size_t i) const {
     const auto pixel = tiling.pixel(i);
     if (!tiling.inside(pixel)) return;
-    const vec4& colour = colours[i - first];
-    const vec3 value = show == Show::samples ? vec3(1) : vec3(colour);
-    film[tiling.offset(pixel)] += vec4(value, 1);
-  }
-};
-
-struct AddPixels {
-  Tiling tiling;
-  std::size_t first;
-  const vec4* pixels;
-  Show show;
-  vec4* film;
-  TRILHA_HD void operator()(std::size_t i) const {
-    const auto pixel = tiling.pixel(i);
-    if (!tiling.inside(pixel)) return;
-    const vec4& of = pixels[i - first];
-    film[tiling.offset(pixel)] += vec4(show == Show::samples ? vec3(of.w) : vec3(of), 1);
+    const vec4& value = values[i - first];
+    film[tiling.offset(pixel)] += vec4(fourth ? vec3(value.w) : vec3(value), 1);
   }
 };
 
@@ -189,7 +178,6 @@ void WhittedRenderer::colours(const Ray* rays, vec4* colours, std::size_t n) {
   const std::uint64_t total = reduce(stream_, counts, n, std::uint64_t{0}, Sum{});
   rays_ += static_cast<double>(total & ((std::uint64_t{1} << 44) - 1));
   overflows_ += total >> 44;
-  if (settings_.show == Show::rays) for_each(stream_, n, ShowRays{colours});
 }
 
 std::optional<KernelCost> WhittedRenderer::kernel_cost() const {
@@ -253,7 +241,8 @@ bool WhittedRenderer::add_pattern(Film& film, const PinholeCamera& camera, std::
         times_.rays += rays_timer.milliseconds();
         colours(rays, out, n);
         Timer film_timer(stream_);
-        for_each(stream_, {begin, end}, AddToFilm{tiling, begin, out, settings_.show, film.pixels()});
+        if (settings_.show != Show::picture) for_each(stream_, n, ShowEffort{settings_.show, out});
+        for_each(stream_, {begin, end}, AddToFilm{tiling, begin, out, false, film.pixels()});
         times_.film += film_timer.milliseconds();
         indices_per_ms_ = static_cast<double>(n) / std::max(band_timer.milliseconds(), 1e-3);
       },
@@ -265,10 +254,12 @@ bool WhittedRenderer::add_adaptive(Film& film, const PinholeCamera& camera, doub
   const Tiling& tiling = film.tiling();
   const Backend backend = stream_.backend();
   const float farthest = settings_.terms.farthest;
-  const std::size_t most = backend == Backend::cuda ? 2048 : 16;  // tiles in a band
+  const std::size_t group = backend == Backend::cuda ? 64 : 1, most = backend == Backend::cuda ? 32 : 16;
   return for_each_band(
-      stream_, tiling.tiles(), backend == Backend::cuda ? 64 : 1, most, band_ms,
-      [&](std::size_t first_tile, std::size_t end_tile) {
+      stream_, (tiling.tiles() + group - 1) / group, 1, most, band_ms,
+      [&](std::size_t first_group, std::size_t end_group) {
+        const std::size_t first_tile = first_group * group,
+                          end_tile = std::min(end_group * group, tiling.tiles());
         const std::size_t tiles = end_tile - first_tile, corners = tiles * CornerRays::corners;
         std::size_t n = tiles * Tiling::tile_size;
         Ray* rays = sample_rays_.at_least(backend, corners);
@@ -285,7 +276,8 @@ bool WhittedRenderer::add_adaptive(Film& film, const PinholeCamera& camera, doub
           // at the last level nothing is unlike enough
           const float threshold = level < settings_.adaptive_depth ? settings_.threshold : 2.0f;
           for_each(stream_, n, Unlike{squares, threshold, flags});
-          for_each(stream_, n, AddWhole{squares, flags, n, side * side, pixels});
+          for_each(stream_, n,
+                   AddWhole{squares, flags, n, side * side, settings_.show == Show::rays, pixels});
           const std::size_t count = compact(stream_, flags, n, chosen);
           rays = sample_rays_.at_least(backend, 5 * count);
           seen = colours_.at_least(backend, 5 * count);
@@ -298,7 +290,8 @@ bool WhittedRenderer::add_adaptive(Film& film, const PinholeCamera& camera, doub
           n = 4 * count;
         }
         for_each(stream_, {first_tile * Tiling::tile_size, end_tile * Tiling::tile_size},
-                 AddPixels{tiling, first_tile * Tiling::tile_size, pixels, settings_.show, film.pixels()});
+                 AddToFilm{tiling, first_tile * Tiling::tile_size, pixels, settings_.show == Show::samples,
+                           film.pixels()});
       },
       keep_going);
 }

@@ -17,11 +17,12 @@ namespace {
 constexpr unsigned rt_features = feature::mirrors | feature::glass | feature::lamps;
 
 template <class View, class Test>
-void follow(const Stream& stream, const View& view, const Terms& terms, unsigned threads, const Ray* rays,
-            vec4* colours, std::size_t n) {
-  using Structure = RtBruteForce<View, Test>;
-  const FollowTree<rt_features, View, Structure> pass{
-      view, {view, surely_ahead(terms)}, terms, rays, colours};
+using RtTree = FollowTree<rt_features, View, BruteForce<RtTriangles<View, Test>>>;
+
+template <class View, class Test>
+void follow(const Stream& stream, const View& view, std::uint32_t count, const Terms& terms, unsigned threads,
+            const Ray* rays, vec4* colours, std::size_t n) {
+  const RtTree<View, Test> pass{view, {{view, count, surely_ahead(terms)}}, terms, rays, colours};
 #if defined(__CUDACC__)
   if (stream.backend() == Backend::cuda) {
     stop_if_cancelled();
@@ -34,24 +35,26 @@ void follow(const Stream& stream, const View& view, const Terms& terms, unsigned
 
 template <class View, class Test>
 std::optional<KernelCost> cost_of(const Stream& stream) {
-  return kernel_cost<FollowTree<rt_features, View, RtBruteForce<View, Test>>>(stream);
+  return kernel_cost<RtTree<View, Test>>(stream);
 }
 
 }  // namespace
 
 RtGpu::RtGpu(const WhittedScene& scene, Kernel version, int block_width, int block_height,
              const Stream& stream)
-    : stream_(stream), version_(version), threads_(static_cast<unsigned>(block_width * block_height)) {
+    : stream_(stream),
+      version_(version),
+      threads_(static_cast<unsigned>(block_width * block_height)),
+      count_(scene.triangle_count()) {
   if (threads_ > most_threads)
     throw InputError("a block of " + std::to_string(block_width) + " times " + std::to_string(block_height) +
                      " threads is too large; there may be " + std::to_string(most_threads));
   const ShadingView& view = scene.view();
-  const std::uint32_t count = view.triangle_count();
-  const RtHeader header{count, view.lamp_count, view.ambient, view.background, view.has_normals()};
+  const RtHeader header{count_, view.lamp_count, view.ambient, view.background, view.has_normals()};
 
-  std::vector<RtTriangle> list(count);
+  std::vector<RtTriangle> list(count_);
   const Mesh& mesh = scene.mesh();
-  for (std::uint32_t i = 0; i < count; ++i) {
+  for (std::uint32_t i = 0; i < count_; ++i) {
     const uvec3 t = mesh.triangles[i];
     const auto normal = [&](std::uint32_t vertex) { return header.smooth ? mesh.normals[vertex] : vec3(0); };
     list[i] = {mesh.positions[t.x],
@@ -118,13 +121,14 @@ Texels RtGpu::texels(Buffer<vec4>& buffer, const std::vector<vec4>& values) {
 void RtGpu::colours(const Terms& terms, const Ray* rays, vec4* colours, std::size_t n) const {
   switch (version_) {
     case Kernel::rt_gpu_jm:
-      return follow<RtTextureView, PlaneBarycentric>(stream_, texture_view_, terms, threads_, rays, colours,
-                                                     n);
+      return follow<RtTextureView, PlaneBarycentric>(stream_, texture_view_, count_, terms, threads_, rays,
+                                                     colours, n);
     case Kernel::rt_gpu_jm_ir:
-      return follow<RtTextureView, MollerTrumbore>(stream_, texture_view_, terms, threads_, rays, colours, n);
+      return follow<RtTextureView, MollerTrumbore>(stream_, texture_view_, count_, terms, threads_, rays,
+                                                   colours, n);
     default:
-      return follow<RtGlobalView, PlaneBarycentric>(stream_, {{}, list_.data()}, terms, threads_, rays,
-                                                    colours, n);
+      return follow<RtGlobalView, PlaneBarycentric>(stream_, {{}, list_.data()}, count_, terms, threads_,
+                                                    rays, colours, n);
   }
 }
 

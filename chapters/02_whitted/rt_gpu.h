@@ -157,47 +157,27 @@ struct RtTextureView : OnlyTriangles {
   }
 };
 
-// ---- brute force over either -------------------------------------------------
+// ---- their triangles ---------------------------------------------------------
 
-/// Every triangle of the view, by a test that keeps the corners as they are.
+/// The view's triangles as primitives of chapter 01's brute force, by a test that keeps the corners as they
+/// are.
 template <class View, class Test>
-struct RtBruteForce {
+struct RtTriangles {
+  using Scalar = float;
   View view;
+  std::uint32_t count;
   bool surely_ahead;
 
-  template <class ProbeType>
-  TRILHA_HD Hit closest(const Ray& ray, ProbeType& probe) const {
-    Hit hit;
-    hit.t = ray.t_max;
-    const auto constants = Test::constants(ray);
-    const std::uint32_t count = view.triangle_count();
-    for (std::uint32_t i = 0; i < count; ++i) try_triangle(i, ray, constants, hit);
-    probe.test_primitives(count);
-    return hit;
-  }
-  template <class ProbeType>
-  TRILHA_HD bool occluded(const Ray& ray, ProbeType& probe) const {
-    Hit hit;
-    hit.t = ray.t_max;
-    const auto constants = Test::constants(ray);
-    const std::uint32_t count = view.triangle_count();
-    for (std::uint32_t i = 0; i < count && !hit.found(); ++i) {
-      try_triangle(i, ray, constants, hit);
-      probe.test_primitives(1);
-    }
-    return hit.found();
-  }
-
- private:
+  TRILHA_HD auto constants(const Ray& ray) const { return Test::constants(ray); }
   template <class Constants>
-  TRILHA_HD void try_triangle(std::uint32_t i, const Ray& ray, const Constants& constants, Hit& hit) const {
+  TRILHA_HD void intersect(std::uint32_t i, const Ray& ray, const Constants& constants, Hit& hit) const {
     const Corners<vec3> corners = view.corners(i);
     float numbers[Test::numbers];
     Test::prepare(corners.a, corners.b, corners.c, numbers);
-    const auto measure = Test::measure(Numbers<float>{numbers}, ray, constants);
+    const Numbers<float> triangle{numbers};
+    const auto measure = Test::measure(triangle, ray, constants);
     if (Test::may_hit(measure))
-      Triangles<Test>{nullptr, 0, false, surely_ahead}.settle(measure, Numbers<float>{numbers}, i, ray,
-                                                              constants, hit);
+      Triangles<Test>{nullptr, 0, false, surely_ahead}.settle(measure, triangle, i, ray, constants, hit);
   }
 };
 
@@ -226,6 +206,7 @@ class RtGpu {
   Stream stream_;
   Kernel version_;
   unsigned threads_;
+  std::uint32_t count_;
   RtTextureView texture_view_{};
   Buffer<RtTriangle> triangles_;
   Buffer<WhittedMaterial> materials_;

@@ -180,38 +180,26 @@ StabilityRow judged_row(Backend backend, const std::vector<Panel>& panels, int s
 
 // ---- the techniques ----------------------------------------------------------
 
-std::vector<Technique> offsets() {
+/// A technique for each of the values, which `set` puts into the settings.
+template <class Values, class Set>
+std::vector<Technique> techniques(const Values& values, const Set& set) {
   std::vector<Technique> list;
-  const auto add = [&](const char* name, SelfIntersection method) {
-    list.push_back({name, [=](WhittedSettings& s) { s.terms.self_intersection = method; }});
-  };
-  add("none", SelfIntersection::none);
-  add("fixed", SelfIntersection::fixed);
-  add("wachter-binder", SelfIntersection::wachter_binder);
-  add("error-bound", SelfIntersection::error_bound);
+  for (const auto value : values) list.push_back({name(value), [=](WhittedSettings& s) { set(s, value); }});
   return list;
+}
+
+std::vector<Technique> offsets() {
+  return techniques(all_self_intersections,
+                    [](WhittedSettings& s, SelfIntersection method) { s.terms.self_intersection = method; });
 }
 std::vector<Technique> tests() {
-  std::vector<Technique> list;
-  for (const TriangleTest test : all_triangle_tests)
-    list.push_back({name(test), [=](WhittedSettings& s) { s.test = test; }});
-  return list;
+  return techniques(all_triangle_tests, [](WhittedSettings& s, TriangleTest test) { s.test = test; });
 }
 std::vector<Technique> kernels() {
-  std::vector<Technique> list;
-  for (const Kernel kernel : all_kernels)
-    list.push_back({name(kernel), [=](WhittedSettings& s) { s.kernel = kernel; }});
-  return list;
+  return techniques(all_kernels, [](WhittedSettings& s, Kernel kernel) { s.kernel = kernel; });
 }
 std::vector<Technique> fresnel_modes() {
-  std::vector<Technique> list;
-  const auto add = [&](const char* name, Fresnel mode) {
-    list.push_back({name, [=](WhittedSettings& s) { s.terms.fresnel = mode; }});
-  };
-  add("exact", Fresnel::exact);
-  add("schlick", Fresnel::schlick);
-  add("constant", Fresnel::constant);
-  return list;
+  return techniques(all_fresnels, [](WhittedSettings& s, Fresnel fresnel) { s.terms.fresnel = fresnel; });
 }
 
 // ---- convex bodies in double -------------------------------------------------

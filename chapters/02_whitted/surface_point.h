@@ -67,6 +67,13 @@ TRILHA_HD inline T compensated_dot(const Vec3<T>& a, const Vec3<T>& b, T c, T d)
   return sum + rest;
 }
 
+/// a×b, each component to two units in the last place.
+template <class T>
+TRILHA_HD inline Vec3<T> exact_cross(const Vec3<T>& a, const Vec3<T>& b) {
+  return {difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
+          difference_of_products(a.x, b.y, a.y, b.x)};
+}
+
 /// v at length one, whatever its size; every component right up to γ₄: three roundings in a sum of squares,
 /// halved by the root, the root, the quotient. Zero where v is zero or not finite.
 template <class T>
@@ -158,9 +165,7 @@ TRILHA_HD inline SurfacePointOf<T> triangle_point(const Vec3<T>& a, const Vec3<T
   const T scale1 = scale_to_one(largest(e1)), scale2 = scale_to_one(largest(e2));
   const Vec3<T> f1 = e1 * scale1, f2 = e2 * scale2;
   const Vec3<T> rest1 = rounded_off(b, a, e1) * scale1, rest2 = rounded_off(c, a, e2) * scale2;
-  const Vec3<T> main = {difference_of_products(f1.y, f2.z, f1.z, f2.y),
-                        difference_of_products(f1.z, f2.x, f1.x, f2.z),
-                        difference_of_products(f1.x, f2.y, f1.y, f2.x)};
+  const Vec3<T> main = exact_cross(f1, f2);
   const Vec3<T> n = main + (fused_cross(f1, rest2) + fused_cross(rest1, f2));
   s.normal = unit(n);
   const T sizes = fused_dot(f1, f1) * fused_dot(f2, f2), area2 = largest(n);

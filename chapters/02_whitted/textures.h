@@ -9,6 +9,7 @@
 #include <cstring>
 #include <vector>
 
+#include "chapters/02_whitted/surface_point.h"
 #include "common/math/precision.h"
 #include "common/parallel/buffer.h"
 #include "common/scene/scene.h"
@@ -218,32 +219,22 @@ TRILHA_HD inline float texture_level(float texels) {
 /// surface.
 TRILHA_HD inline float map_level(const TexturesView& view, const Map& map, float footprint) {
   if (!view.has(map.texture)) return 0;
-  const TextureLevelView largest = view.levels[view.textures[map.texture].first_level];
-  const float across = std::sqrt(std::fabs(map.scale.x) * static_cast<float>(largest.width));
-  const float up = std::sqrt(std::fabs(map.scale.y) * static_cast<float>(largest.height));
+  const TextureLevelView finest = view.levels[view.textures[map.texture].first_level];
+  const float across = std::sqrt(std::fabs(map.scale.x) * static_cast<float>(finest.width));
+  const float up = std::sqrt(std::fabs(map.scale.y) * static_cast<float>(finest.height));
   return texture_level(footprint * across * up);
 }
 
+/// The larger |component|.
 template <class T>
-TRILHA_HD inline T largest_size(const Vec3<T>& v) {
-  return max(std::fabs(v.x), max(std::fabs(v.y), std::fabs(v.z)));
-}
-template <class T>
-TRILHA_HD inline T largest_size(const Vec2<T>& v) {
+TRILHA_HD inline T largest(const Vec2<T>& v) {
   return max(std::fabs(v.x), std::fabs(v.y));
-}
-
-/// a×b, each component to two units in the last place.
-template <class T>
-TRILHA_HD inline Vec3<T> exact_cross(const Vec3<T>& a, const Vec3<T>& b) {
-  return {difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
-          difference_of_products(a.x, b.y, a.y, b.x)};
 }
 
 /// Makes the vector one of length one. False, and what is left has no meaning, where it has no direction.
 template <class T>
 TRILHA_HD inline bool normalise(Vec3<T>& v) {
-  const T size = largest_size(v);
+  const T size = largest(v);
   if (!is_normal(size)) return false;
   v = v / size;
   const T length = std::sqrt(fused_dot(v, v));
@@ -270,8 +261,8 @@ TRILHA_HD inline ScaledTriangle<T> scaled_triangle(const Vec3<T>& a, const Vec3<
   s.e2 = c - a;
   s.d1 = uvb - uva;
   s.d2 = uvc - uva;
-  const T size = max(largest_size(s.e1), largest_size(s.e2));
-  const T size_uv = max(largest_size(s.d1), largest_size(s.d2));
+  const T size = max(largest(s.e1), largest(s.e2));
+  const T size_uv = max(largest(s.d1), largest(s.d2));
   s.valid = is_normal(size) && is_normal(size_uv);
   if (!s.valid) return s;
   s.e1 = s.e1 / size;
@@ -281,7 +272,7 @@ TRILHA_HD inline ScaledTriangle<T> scaled_triangle(const Vec3<T>& a, const Vec3<
   s.scale = size_uv / size;
   s.normal = exact_cross(s.e1, s.e2);
   s.determinant = difference_of_products(s.d1.x, s.d2.y, s.d2.x, s.d1.y);
-  const T thickest = largest_size(s.normal);
+  const T thickest = largest(s.normal);
   const Vec3<T> n = s.normal / thickest;
   s.normal_length = thickest * std::sqrt(fused_dot(n, n));
   s.valid = is_normal(s.normal_length) && is_normal(s.determinant) && s.scale > 0;

@@ -1,6 +1,6 @@
 #pragma once
 // What split kernels ask of a structure: three questions, each for many rays at once. All arrays lie on the
-// tracer's backend. Any structure answers them (StructureTracer); brute force has quicker loops of its own.
+// tracer's backend. Whatever structure answers them, the shading passes stay as they are.
 
 #include "chapters/02_whitted/scene_view.h"
 #include "common/parallel/for_each.h"
