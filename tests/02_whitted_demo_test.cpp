@@ -344,3 +344,102 @@ TEST_CASE("02: after a cancelled build or sample the demo can be built again") {
     REQUIRE(subject.picture(scene) == expected);
   }
 }
+
+// Catches: another tree than the kernels follow, a hit that is not the picture's, lamps that are in sight or
+// not against what is told, a tree of the settings that were.
+TEST_CASE("02: a pixel's tree is laid open as the kernels follow it") {
+  const Scene scene = rich_scene();
+  const auto fact = [](const Inspection& seen, const std::string& what) -> std::string {
+    for (const auto& [name, value] : seen.facts)
+      if (name == what) return value;
+    return "";
+  };
+  for (const char* depth : {"0", "3"}) {
+    Subject subject;
+    for (const auto& [name, text] :
+         {std::pair{"antialiasing", "none"}, {"show", "rays"}, {"shadows", "false"}, {"depth", depth}})
+      subject.settings[name].set_text(text);
+    subject.build(scene);
+    const std::vector<vec3> rays = subject.sample(scene);  // without shadows, those of the tree alone
+    int deep = 0, met = 0;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        INFO("pixel " << x << ", " << y << ", depth " << depth);
+        const Inspection seen = subject.demo->inspect(scene.camera, width, height, x, y);
+        const auto count = static_cast<std::size_t>(rays[std::size_t(y * width + x)].x);
+        CHECK(fact(seen, "rays of the tree") == std::to_string(count));
+        const bool hit = fact(seen, "eye").find("meets nothing") == std::string::npos;
+        CHECK(hit == seen.point.has_value());
+        deep += count > 1, met += hit;
+        std::size_t ink[3] = {};
+        for (const Line& line : seen.lines) ++ink[static_cast<int>(line.ink)];
+        CHECK(ink[static_cast<int>(Line::Ink::ray)] == count - 1);
+        CHECK(ink[static_cast<int>(Line::Ink::surface)] == (hit ? 1 : 0));
+      }
+    CHECK(met > 100);
+    CHECK((deep > 50) == (std::strcmp(depth, "0") != 0));
+  }
+
+  // a lamp in sight of the eye's hit and its line, against a picture with that lamp alone
+  Scene one_lamp = rich_scene();
+  one_lamp.lights.resize(1);
+  one_lamp.ambient = vec3(0);
+  one_lamp.features = features_of(one_lamp);
+  Subject subject;
+  for (const auto& [name, text] : {std::pair{"antialiasing", "none"}, {"depth", "0"}, {"emission", "false"}})
+    subject.settings[name].set_text(text);
+  subject.build(one_lamp);
+  const std::vector<vec3> lit = subject.sample(one_lamp);
+  int in_sight = 0, in_shadow = 0;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const Inspection seen = subject.demo->inspect(one_lamp.camera, width, height, x, y);
+      if (!seen.point || fact(seen, "eye").find("leaf") != std::string::npos) continue;
+      const auto lines = std::count_if(seen.lines.begin(), seen.lines.end(),
+                                       [](const Line& line) { return line.ink == Line::Ink::structure; });
+      const vec3& pixel = lit[std::size_t(y * width + x)];
+      const bool sees = fact(seen, "eye").find("1 of 1 lights in sight") != std::string::npos;
+      CHECK(lines == (sees ? 1 : 0));
+      if (fact(seen, "eye").find("lights in sight") == std::string::npos) continue;  // none would light it
+      if (largest(pixel) > 0 && largest(pixel) < 1e-6f) continue;
+      if (fact(seen, "rays of the tree") != "1") continue;  // something lies behind that is there in part
+      CHECK(sees == (largest(pixel) > 0));
+      ++(sees ? in_sight : in_shadow);
+    }
+  CHECK(in_sight > 40);
+  CHECK(in_shadow > 5);
+}
+
+// Catches: something left out that is not told, told though it is there, or without which the picture is
+// another.
+TEST_CASE("02: what is left out is told, and can be kept") {
+  for (const char* name : {"matte", "lights", "mirror", "glass", "smooth", "texture", "alpha"}) {
+    INFO(name);
+    const Scene scene = load_scene(std::string("feature:case=") + name);
+    Subject subject;
+    const std::vector<vec3> plain = subject.picture(scene);
+    std::string told;
+    std::vector<Omission> omissions = subject.demo->omissions();
+    for (const Omission& omission : omissions) {
+      told += omission.what + "; ";
+      CHECK_FALSE(omission.why.empty());
+      omission.keep(true);
+      CHECK(subject.picture(scene) == plain);
+      CHECK(subject.demo->omissions().size() < omissions.size());
+      omission.keep(false);
+      subject.build(scene);
+      CHECK(subject.demo->omissions().size() == omissions.size());
+    }
+    const auto says = [&](const char* what) { return told.find(what) != std::string::npos; };
+    const std::string word = name;
+    CHECK(says("refracted rays") == (word != "glass" && word != "alpha"));
+    CHECK(says("mirrored rays") == (word != "mirror" && word != "glass" && word != "alpha"));
+    CHECK(says("maps") == (word != "texture" && word != "alpha"));
+    CHECK(says("not there everywhere") == (word != "alpha"));
+    CHECK(says("the loop over lights") == (word == "matte" || word == "smooth"));
+  }
+  Subject subject;
+  subject.settings["specialise"].set_text("false");
+  subject.build(load_scene("feature:case=matte"));
+  CHECK(subject.demo->omissions().empty());
+}
