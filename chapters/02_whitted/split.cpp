@@ -305,7 +305,7 @@ void SplitTrees::colours(const ShadingView& view, const Tracer& tracer, const Te
                       roots_.at_least(backend, roots)});
   segments_ = {{0, roots}};
   // A piece fills the machine; its buffers take some 350 bytes an entry and 70 a shadow ray.
-  const std::size_t most = backend == Backend::cuda ? 1 << 21 : 1 << 18;
+  const std::size_t most = backend == Backend::cuda ? 1 << 22 : 1 << 18;
   const std::size_t capacity = std::max<std::size_t>(most / std::max(view.lamp_count, 1u), 256);
   with_features(features, [&](auto chosen) {
     follow<chosen()>(view, tracer, terms, cache_shadows, colours, capacity);
