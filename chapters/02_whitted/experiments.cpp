@@ -781,7 +781,7 @@ std::vector<Experiment> whitted_experiments() {
                           measure_antialiasing};
   Experiment tree{
       "tree",
-      1.5,
+      2.5,
       {plot_of("tree", "Error of the ray tree over time",
                "trees cut at a depth (0, 1, 2, 3, 4, 6, 8, 12, 16, 32, 64) or where a branch counts "
                "little (0.3 to 1e-4), against the whole tree",
