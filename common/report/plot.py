@@ -1130,12 +1130,13 @@ def plan_labels(layout, lines, experiment, styles, labelling, x_scale, y_scale):
             if box:
                 panel.labels.append((box, "floor of the reference", GREY, None, "floor-label"))
                 found.take(box)
-        for px, py, by in panel.published:
+        for by in dict.fromkeys(by for _, _, by in panel.published):  # once a publication
             text = fit(by, panel.width * 0.8)
-            spot = [(px if px is not None else 0.0, py if py is not None else 0.0, 4.5, 0.0)]
-            place = found.find(width_of(text) + 1, SMALL, spot)
+            spots = [(px if px is not None else 0.0, py if py is not None else 0.0, 4.5, 0.0)
+                     for px, py, other in panel.published if other == by]
+            place = found.find(width_of(text) + 1, SMALL, spots)
             if place:
-                panel.labels.append((place[0], text, GREY, leader_of(place, spot), "published-label"))
+                panel.labels.append((place[0], text, GREY, leader_of(place, spots), "published-label"))
                 found.take(place[0], panel.labels[-1][3])
 
     labelled = len(lines) <= 1
