@@ -55,7 +55,8 @@ struct Triangles {
   /// What the test wants to know of a ray, worked out once for all triangles.
   TRILHA_HD auto constants(const RayOf<T>& ray) const { return Test::constants(ray); }
 
-  /// Makes triangle i the hit if it is nearer than the hit so far. Of equals, the first stays.
+  /// Makes triangle i the hit if it is nearer than the hit so far; of equal t the lower number stays, in
+  /// whatever order a structure asks.
   template <class Constants>
   TRILHA_HD void intersect(std::uint32_t i, const RayOf<T>& ray, const Constants& constants,
                            HitOf<T>& hit) const {
@@ -70,14 +71,14 @@ struct Triangles {
                         const RayOf<T>& ray, const Constants& constants, HitOf<T>& hit) const {
     Solution<T> s;
     if (!Test::solve(measure, ray, constants, s)) return;
-    if (!(s.t < hit.t && (s.front || !one_sided))) return;
+    if (!(comes_before(s.t, i, hit) && (s.front || !one_sided))) return;
     if (surely_ahead) {
       // a t within its error of zero says nothing: the surface that the ray starts on, or the one ahead
       if (!(std::fabs(s.t) > Test::t_bound(measure, triangle, ray, constants, s.t)))
         s.t = Test::near_t(triangle, ray, constants);
       if (!(s.t > 0)) return;
     }
-    if (!(s.t >= ray.t_min && s.t < hit.t)) return;
+    if (!(s.t >= ray.t_min && comes_before(s.t, i, hit))) return;
     hit = {s.t, i, 0, s.u, s.v};
   }
 };

@@ -39,6 +39,13 @@ struct HitOf {
 };
 using Hit = HitOf<float>;
 
+/// Does a hit of primitive `i` at t come before the hit so far? Of equal t the lower number does, in whatever
+/// order primitives are asked; a t of t_max is none.
+template <class T>
+TRILHA_HD bool comes_before(T t, std::uint32_t i, const HitOf<T>& hit) {
+  return t < hit.t || (t == hit.t && i < hit.primitive && hit.found());
+}
+
 /// Counts what a traversal did; the heat maps and reports read it.
 struct Probe {
   std::uint32_t nodes_visited = 0;
