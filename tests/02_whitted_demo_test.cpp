@@ -1,9 +1,12 @@
 #include "chapters/02_whitted/demo.h"
 
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <set>
 
+#include "common/app/command_line.h"
 #include "common/parallel/cancellation.h"
 #include "common/scene/made/solids.h"
 #include "tests/lessons.h"
@@ -106,6 +109,25 @@ std::vector<std::string> texts_of(const Setting& setting) {
 
 // Catches: a heading that was renamed, a setting that is explained nowhere.
 TEST_CASE("02: every setting is explained by the lesson") { check_lessons(*make_whitted_demo()); }
+
+// Catches: a key of the original's configuration that this chapter has no setting for.
+TEST_CASE("02: the configuration file of Ordeix & Cioli reaches this chapter") {
+  const std::string file = (std::filesystem::temp_directory_path() / "trilha_original.cfg").string();
+  std::ofstream(file) << "RESOLUCION.X=64\nRESOLUCION.Y=48\nINFINITO=1e20\nZERO=0.001\n"
+                         "PROFUNDIDAD_RECURSION=3\nTHREADS.X=16\nTHREADS.Y=8\nESCENA=pri\n";
+  Subject subject;
+  Options options;
+  read_config_file(file, *subject.demo, subject.settings, options);
+  std::filesystem::remove(file);
+  CHECK(options.warnings.empty());
+  const std::pair<const char*, const char*> read[] = {
+      {"farthest", "1e+20"}, {"self-intersection", "fixed"}, {"fixed-offset", "0.001"},
+      {"depth", "3"},        {"block-width", "16"},          {"block-height", "8"}};
+  for (const auto& [name, value] : read) {
+    INFO(name);
+    CHECK(subject.settings[name].text() == value);
+  }
+}
 
 // Catches: a name that two settings share, a value that does not read back, a range that refuses its ends.
 TEST_CASE("02: settings read back what they say") {

@@ -119,7 +119,7 @@ class WhittedDemo final : public Demo {
                 "corners that differ by more, as a screen shows them, are not alike")
         .only_if(adaptive, "only with --antialiasing adaptive");
     settings
-        .integer("adaptive-depth", settings_.adaptive_depth, 0, 8, Effect::restart,
+        .integer("adaptive-depth", settings_.adaptive_depth, 0, 5, Effect::restart,
                  "how often a pixel may be quartered: 4ⁿ parts at most")
         .only_if(adaptive, "only with --antialiasing adaptive");
     settings.group("Kernels", "One tree, five programs");
@@ -132,6 +132,13 @@ class WhittedDemo final : public Demo {
          {int(Kernel::rt_gpu_jm), "rt-gpu-jm", "... lists of vectors, through textures"},
          {int(Kernel::rt_gpu_jm_ir), "rt-gpu-jm-ir", "... and a test of fewer operations"}},
         Effect::rebuild, "the program that follows the tree; the picture is the same");
+    const auto rt_gpu = [this] { return is_rt_gpu(settings_.kernel); };
+    const std::string threads = " threads of a CUDA block, for as many pixels; both together at most " +
+                                std::to_string(RtGpu::most_threads);
+    settings.integer("block-width", settings_.block_width, 1, 64, Effect::rebuild, "columns of" + threads)
+        .only_if(rt_gpu, "only with --kernel rt-gpu, rt-gpu-jm or rt-gpu-jm-ir");
+    settings.integer("block-height", settings_.block_height, 1, 64, Effect::rebuild, "rows of" + threads)
+        .only_if(rt_gpu, "only with --kernel rt-gpu, rt-gpu-jm or rt-gpu-jm-ir");
     settings
         .choice("test", settings_.test,
                 {{int(TriangleTest::plane), "plane", "chapter 01 says what each costs and where it fails"},
@@ -246,7 +253,7 @@ class WhittedDemo final : public Demo {
     const float size = glm::length(box.size());
     constexpr std::size_t most = 512;
     const std::vector<TreeRay> tree = ray_tree(
-        inspector_->scene().view(), settings_.terms, eye,
+        inspector_->scene().view(), inspector_->terms_of(camera, static_cast<std::uint32_t>(height)), eye,
         [&](const Ray& ray) { return inspector_->trace(ray); }, size, most);
 
     Inspection seen;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "chapters/02_whitted/eye_media.h"
 #include "common/parallel/algorithms.h"
 #include "common/parallel/bands.h"
 #include "common/parallel/for_each.h"
@@ -72,7 +74,9 @@ struct AddToFilm {
     const auto pixel = tiling.pixel(i);
     if (!tiling.inside(pixel)) return;
     const vec4& value = values[i - first];
-    film[tiling.offset(pixel)] += vec4(fourth ? vec3(value.w) : vec3(value), 1);
+    vec4& sum = film[tiling.offset(pixel)];
+    sum += vec4(fourth ? vec3(value.w) : vec3(value), 1);
+    for (int c = 0; c < 3; ++c) sum[c] = min(sum[c], std::numeric_limits<float>::max());
   }
 };
 
@@ -134,13 +138,15 @@ void BruteForceTracer::meets(const Ray* rays, const std::uint32_t* primitives, s
 
 // ---- building ----------------------------------------------------------------
 
-WhittedRenderer::WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream)
+WhittedRenderer::WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream,
+                                 const MakeTracer& make_tracer)
     : settings_(settings), stream_(stream), scene_(scene, settings, stream), split_(stream) {
   const bool general = settings.keep.general_kernel || !settings.specialise;
   features_ = general ? feature::every : scene_.features();
   const std::uint32_t count = scene_.triangle_count();
   if (settings.kernel == Kernel::split)
-    tracer_ = std::make_unique<BruteForceTracer>(scene_, settings.test, stream_);
+    tracer_ = make_tracer ? make_tracer(scene_, settings, stream_)
+                          : std::make_unique<BruteForceTracer>(scene_, settings.test, stream_);
   else if (settings.kernel == Kernel::fused)
     numbers_ = prepare_triangles<Watertight, float>(stream_, Loop::plain, scene_.positions(),
                                                     scene_.triangles(), count);
@@ -185,16 +191,48 @@ std::optional<KernelCost> WhittedRenderer::kernel_cost() const {
   return settings_.kernel == Kernel::fused ? fused_cost(stream_, features_) : split_.shading_cost(features_);
 }
 
+void WhittedRenderer::closest(const Ray* rays, Hit* hits, std::size_t n) const {
+  if (tracer_ != nullptr) return tracer_->closest(Among::all, rays, hits, n);
+  BruteForceTracer(scene_, TriangleTest::watertight, stream_).closest(Among::all, rays, hits, n);
+}
+
 Hit WhittedRenderer::trace(const Ray& ray) const {
   const Buffer<Ray> rays(stream_, {ray});
   Buffer<Hit> hits(stream_.backend(), 1);
-  if (tracer_ != nullptr) {
-    tracer_->closest(Among::all, rays.data(), hits.data(), 1);
-  } else {
-    const BruteForceTracer tracer(scene_, TriangleTest::watertight, stream_);
-    tracer.closest(Among::all, rays.data(), hits.data(), 1);
-  }
+  closest(rays.data(), hits.data(), 1);
   return hits.to_vector(stream_)[0];
+}
+
+Media WhittedRenderer::media_at(const vec3& point) const {
+  if ((scene_.features() & feature::glass) == 0 || !scene_.may_be_in_glass(point)) return {};
+  // any way out will do, unless it touches an edge on which rounding decides: the third one settles that
+  constexpr int n = 3;
+  const vec3 directions[n] = {{0.437f, 0.721f, 0.538f}, {-0.654f, 0.313f, 0.689f}, {0.291f, -0.577f, 0.763f}};
+  std::vector<Ray> from(n);
+  for (int i = 0; i < n; ++i) from[i].origin = point, from[i].direction = directions[i];
+  Buffer<Ray> rays(stream_, from);
+  Buffer<Hit> hits(stream_.backend(), n);
+  Buffer<WayOut> ways(stream_, std::vector<WayOut>(n));
+  const auto inside = [](const Ray& ray) { return ray.t_min < ray.t_max; };
+  do {
+    closest(rays.data(), hits.data(), n);
+    for_each(stream_, n, GoOut{scene_.view(), hits.data(), rays.data(), ways.data()});
+    from = rays.to_vector(stream_);
+  } while (std::any_of(from.begin(), from.end(), inside));
+  Media found[n];
+  for (int i = 0; i < n; ++i) found[i] = entered_before(ways.to_vector(stream_)[i]);
+  return found[1] == found[2] ? found[1] : found[0];
+}
+
+Terms WhittedRenderer::terms_of(const Camera& camera, std::uint32_t height) {
+  if (eye_ != camera.eye) {
+    settings_.terms.eye = media_at(camera.eye);
+    eye_ = camera.eye;
+  }
+  Terms terms = settings_.terms;
+  terms.pixel_angle =
+      static_cast<float>(2 * std::tan(glm::radians(double(camera.field_of_view)) / 2) / std::max(height, 1u));
+  return terms;
 }
 
 bool WhittedRenderer::add_sample(Film& film, const Camera& camera, std::uint32_t sample, std::uint64_t seed,
@@ -202,8 +240,7 @@ bool WhittedRenderer::add_sample(Film& film, const Camera& camera, std::uint32_t
   const Tiling& tiling = film.tiling();
   const auto pinhole =
       PinholeCamera::make(camera, static_cast<int>(tiling.width), static_cast<int>(tiling.height));
-  settings_.terms.pixel_angle = static_cast<float>(
-      2 * std::tan(glm::radians(double(camera.field_of_view)) / 2) / std::max(tiling.height, 1u));
+  settings_.terms = terms_of(camera, tiling.height);
   return settings_.antialiasing == Antialiasing::adaptive
              ? add_adaptive(film, pinhole, band_ms, keep_going)
              : add_pattern(film, pinhole, sample, seed, band_ms, keep_going);
@@ -254,7 +291,10 @@ bool WhittedRenderer::add_adaptive(Film& film, const PinholeCamera& camera, doub
   const Tiling& tiling = film.tiling();
   const Backend backend = stream_.backend();
   const float farthest = settings_.terms.farthest;
-  const std::size_t group = backend == Backend::cuda ? 64 : 1, most = backend == Backend::cuda ? 32 : 16;
+  // a pixel may be quartered into 4^depth squares: few tiles at a time, so that they stay in memory
+  const int deeper = std::max(settings_.adaptive_depth - 3, 0);
+  const std::size_t group = backend == Backend::cuda ? std::size_t{64} >> 2 * deeper : 1,
+                    most = std::max<std::size_t>((backend == Backend::cuda ? 32 : 16) >> 2 * deeper, 1);
   return for_each_band(
       stream_, (tiling.tiles() + group - 1) / group, 1, most, band_ms,
       [&](std::size_t first_group, std::size_t end_group) {

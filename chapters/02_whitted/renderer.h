@@ -18,9 +18,7 @@ class BruteForceTracer final : public Tracer {
  public:
   BruteForceTracer(const WhittedScene& scene, TriangleTest test, const Stream& stream);
 
-  /// Are hits only those that are beyond the error of their t?
-  void set_surely_ahead(bool surely_ahead) { surely_ahead_ = surely_ahead; }
-
+  void set_surely_ahead(bool surely_ahead) override { surely_ahead_ = surely_ahead; }
   bool any_clear() const override { return parted_; }
   void closest(Among among, const Ray* rays, Hit* hits, std::size_t n) const override;
   void occluded(Among among, const Ray* rays, std::uint8_t* occluded, std::size_t n) const override;
@@ -49,9 +47,10 @@ class BruteForceTracer final : public Tracer {
 
 class WhittedRenderer {
  public:
-  /// Throws what WhittedScene does, DeviceError if the backend is missing, Cancelled in work that was
-  /// cancelled.
-  WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream);
+  /// Split kernels ask the tracer that is made; by default brute force. Throws what WhittedScene and the
+  /// tracer do, DeviceError if the backend is missing, Cancelled in work that was cancelled.
+  WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream,
+                  const MakeTracer& make_tracer = {});
   ~WhittedRenderer();
 
   /// Adds sample number `sample` to every pixel; of the adaptive method, all of it. keep_going(fraction) is
@@ -64,11 +63,20 @@ class WhittedRenderer {
   /// Both arrays lie on the stream's backend.
   void colours(const Ray* rays, vec4* colours, std::size_t n);
 
+  /// The glass bodies that a point is in.
+  Media media_at(const vec3& point) const;
+
   /// The nearest hit of a ray of the host.
   Hit trace(const Ray& ray) const;
 
   /// Settings that need no rebuild: the terms' numbers and the pattern.
-  void set(const WhittedSettings& settings) { settings_ = settings; }
+  void set(const WhittedSettings& settings) {
+    const Media eye = settings_.terms.eye;
+    settings_ = settings;
+    settings_.terms.eye = eye;
+  }
+  /// What the terms say of a camera: the width of its pixels, and what glass its eye is in.
+  Terms terms_of(const Camera& camera, std::uint32_t height);
 
   /// What the kernel that shades, of those that are not split the one kernel, takes of a CUDA device; nothing
   /// on the CPU.
@@ -88,6 +96,7 @@ class WhittedRenderer {
   }
 
  private:
+  void closest(const Ray* rays, Hit* hits, std::size_t n) const;
   bool add_pattern(Film& film, const PinholeCamera& camera, std::uint32_t sample, std::uint64_t seed,
                    double band_ms, const std::function<bool(double)>& keep_going);
   bool add_adaptive(Film& film, const PinholeCamera& camera, double band_ms,
@@ -97,8 +106,9 @@ class WhittedRenderer {
   Stream stream_;
   WhittedScene scene_;
   unsigned features_;
-  std::unique_ptr<BruteForceTracer> tracer_;
-  Buffer<float> numbers_;  ///< of the triangles, for the fused kernel
+  std::unique_ptr<Tracer> tracer_;  ///< of split kernels
+  std::optional<vec3> eye_;         ///< for which the terms know what it is in
+  Buffer<float> numbers_;           ///< of the triangles, for the fused kernel
   std::unique_ptr<RtGpu> rt_gpu_;
   SplitTrees split_;
   WhittedTimes times_;

@@ -54,6 +54,7 @@ class LeavingRays final : public Tracer {
     for (std::size_t i = 0; i < roots; ++i) alive_[i] = i;
   }
 
+  void set_surely_ahead(bool) override {}  // as the one that is asked has it
   bool any_clear() const override { return asked_.any_clear(); }
   void closest(Among among, const Ray* rays, Hit* hits, std::size_t n) const override {
     asked_.closest(among, rays, hits, n);

@@ -2,6 +2,9 @@
 // What split kernels ask of a structure: three questions, each for many rays at once. All arrays lie on the
 // tracer's backend. Whatever structure answers them, the shading passes stay as they are.
 
+#include <functional>
+#include <memory>
+
 #include "chapters/02_whitted/scene_view.h"
 #include "common/parallel/for_each.h"
 
@@ -13,6 +16,8 @@ enum class Among { all, opaque, clear };
 class Tracer {
  public:
   virtual ~Tracer() = default;
+  /// Are hits only those that are beyond the error of their t?
+  virtual void set_surely_ahead(bool surely_ahead) = 0;
   /// Is there any primitive that light goes through?
   virtual bool any_clear() const = 0;
   /// The nearest hit of each ray, t in [ray.t_min, ray.t_max).
@@ -23,6 +28,12 @@ class Tracer {
   virtual void meets(const Ray* rays, const std::uint32_t* primitives, std::uint8_t* met,
                      std::size_t n) const = 0;
 };
+
+struct WhittedSettings;
+class WhittedScene;
+/// Makes a tracer of the scene, which outlives it. Later chapters bring their own.
+using MakeTracer =
+    std::function<std::unique_ptr<Tracer>(const WhittedScene&, const WhittedSettings&, const Stream&)>;
 
 /// Numbers the hits among the triangles from `first_triangle` on, and lowers them to those of spheres and
 /// planes.
