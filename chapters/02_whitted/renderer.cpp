@@ -12,37 +12,6 @@
 namespace trilha {
 namespace {
 
-/// Ray i against one primitive.
-template <class Test>
-struct MeetsPrimitive {
-  ShadingView view;
-  bool surely_ahead;
-  const Ray* rays;
-  const std::uint32_t* primitives;
-  std::uint8_t* met;
-
-  TRILHA_HD void operator()(std::size_t i) const {
-    const std::uint32_t p = primitives[i];
-    const Ray ray = rays[i];
-    Hit hit;
-    hit.t = ray.t_max;
-    if (p < view.triangle_count()) {
-      const Corners<vec3> corners = view.corners(p);
-      float numbers[Test::numbers];
-      Test::prepare(corners.a, corners.b, corners.c, numbers);
-      const Triangles<Test> alone{numbers, 1, false, surely_ahead};
-      alone.intersect(0, ray, alone.constants(ray), hit);
-      met[i] = hit.found() ? 1 : 0;
-      return;
-    }
-    if (p - view.spheres.first < view.spheres.count)
-      view.spheres.intersect(p - view.spheres.first, ray, hit);
-    else if (p - view.planes.first < view.planes.count)
-      view.planes.intersect(p - view.planes.first, ray, {}, hit);
-    met[i] = hit.found() ? 1 : 0;
-  }
-};
-
 /// What came back of a band, counted: the rays, and from bit 44 on, the trees that overflowed.
 struct CountRays {
   const vec4* colours;
@@ -60,6 +29,17 @@ struct ShowEffort {
   TRILHA_HD void operator()(std::size_t i) const {
     const float w = colours[i].w;
     colours[i] = vec4(vec3(show == Show::rays ? std::fabs(w) : 1.0f), w);
+  }
+};
+
+/// What the eye's ray takes in the structure.
+struct ShowStructure {
+  Show show;
+  const Probe* probes;
+  vec4* colours;
+  TRILHA_HD void operator()(std::size_t i) const {
+    const std::uint32_t n = show == Show::visited ? probes[i].nodes_visited : probes[i].primitives_tested;
+    colours[i] = vec4(vec3(static_cast<float>(n)), 1);
   }
 };
 
@@ -82,71 +62,17 @@ struct AddToFilm {
 
 }  // namespace
 
-// ---- brute force -------------------------------------------------------------
-
-BruteForceTracer::BruteForceTracer(const WhittedScene& scene, TriangleTest test, const Stream& stream)
-    : stream_(stream), test_(test), view_(scene.view()) {
-  const auto fill = [&](Among among, const PrimitiveCounts& begin, const PrimitiveCounts& end) {
-    Part& part = parts_[static_cast<int>(among)];
-    part.first = begin.triangles;
-    part.count = end.triangles - begin.triangles;
-    part.spheres = {view_.spheres.spheres + begin.spheres, end.spheres - begin.spheres,
-                    view_.spheres.first + begin.spheres};
-    part.planes = {view_.planes.planes + begin.planes, end.planes - begin.planes,
-                   view_.planes.first + begin.planes};
-    with_test(test_, [&](auto chosen) {
-      part.numbers = prepare_triangles<decltype(chosen), float>(stream_, Loop::blocked, scene.positions(),
-                                                                scene.triangles() + part.first, part.count);
-    });
-  };
-  const PrimitiveCounts all{view_.triangle_count(), view_.spheres.count, view_.planes.count};
-  fill(Among::all, {}, all);
-  const PrimitiveCounts& opaque = scene.opaque();
-  parted_ = opaque.triangles + opaque.spheres + opaque.planes != all.triangles + all.spheres + all.planes;
-  if (parted_) {
-    fill(Among::opaque, {}, opaque);
-    fill(Among::clear, opaque, all);
-  }
-}
-
-void BruteForceTracer::closest(Among among, const Ray* rays, Hit* hits, std::size_t n) const {
-  const Part& of = part(among);
-  with_test(test_, [&](auto chosen) {
-    const Triangles<decltype(chosen)> triangles{of.numbers.data(), of.count, false, surely_ahead_};
-    trace_triangles(stream_, Loop::blocked, triangles, rays, hits, n);
-  });
-  if (of.first + of.spheres.count + of.planes.count > 0)
-    for_each(stream_, n, TraceBodies{of.first, of.spheres, of.planes, rays, hits});
-}
-
-void BruteForceTracer::occluded(Among among, const Ray* rays, std::uint8_t* occluded, std::size_t n) const {
-  const Part& of = part(among);
-  with_test(test_, [&](auto chosen) {
-    const Triangles<decltype(chosen)> triangles{of.numbers.data(), of.count, false, surely_ahead_};
-    occluded_triangles(stream_, Loop::blocked, triangles, rays, occluded, n);
-  });
-  if (of.spheres.count + of.planes.count > 0)
-    for_each(stream_, n, TraceOccludedBodies{of.spheres, of.planes, rays, occluded});
-}
-
-void BruteForceTracer::meets(const Ray* rays, const std::uint32_t* primitives, std::uint8_t* met,
-                             std::size_t n) const {
-  with_test(test_, [&](auto chosen) {
-    for_each(stream_, n, MeetsPrimitive<decltype(chosen)>{view_, surely_ahead_, rays, primitives, met});
-  });
-}
-
 // ---- building ----------------------------------------------------------------
 
 WhittedRenderer::WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream,
-                                 const MakeTracer& make_tracer)
+                                 const MakeStructure& make_structure)
     : settings_(settings), stream_(stream), scene_(scene, settings, stream), split_(stream) {
   const bool general = settings.keep.general_kernel || !settings.specialise;
   features_ = general ? feature::every : scene_.features();
   const std::uint32_t count = scene_.triangle_count();
   if (settings.kernel == Kernel::split)
-    tracer_ = make_tracer ? make_tracer(scene_, settings, stream_)
-                          : std::make_unique<BruteForceTracer>(scene_, settings.test, stream_);
+    tracer_ = std::make_unique<StructureTracer>(
+        scene_, settings.test, make_structure ? make_structure : brute_force(settings.test), stream_);
   else if (settings.kernel == Kernel::fused)
     numbers_ = prepare_triangles<Watertight, float>(stream_, Loop::plain, scene_.positions(),
                                                     scene_.triangles(), count);
@@ -193,7 +119,8 @@ std::optional<KernelCost> WhittedRenderer::kernel_cost() const {
 
 void WhittedRenderer::closest(const Ray* rays, Hit* hits, std::size_t n) const {
   if (tracer_ != nullptr) return tracer_->closest(Among::all, rays, hits, n);
-  BruteForceTracer(scene_, TriangleTest::watertight, stream_).closest(Among::all, rays, hits, n);
+  constexpr TriangleTest test = TriangleTest::watertight;
+  StructureTracer(scene_, test, brute_force(test), stream_).closest(Among::all, rays, hits, n);
 }
 
 Hit WhittedRenderer::trace(const Ray& ray) const {
@@ -241,7 +168,7 @@ bool WhittedRenderer::add_sample(Film& film, const Camera& camera, std::uint32_t
   const auto pinhole =
       PinholeCamera::make(camera, static_cast<int>(tiling.width), static_cast<int>(tiling.height));
   settings_.terms = terms_of(camera, tiling.height);
-  return settings_.antialiasing == Antialiasing::adaptive
+  return settings_.antialiasing == Antialiasing::adaptive && !shows_structure(settings_.show)
              ? add_adaptive(film, pinhole, band_ms, keep_going)
              : add_pattern(film, pinhole, sample, seed, band_ms, keep_going);
 }
@@ -276,9 +203,19 @@ bool WhittedRenderer::add_pattern(Film& film, const PinholeCamera& camera, std::
                             static_cast<std::uint32_t>(settings_.across), sample, seed,
                             settings_.terms.farthest, rays});
         times_.rays += rays_timer.milliseconds();
-        colours(rays, out, n);
+        if (shows_structure(settings_.show) && tracer_ != nullptr) {
+          Timer trace_timer(stream_);
+          Probe* probes = probes_.at_least(stream_.backend(), n);
+          tracer_->probe(rays, probes, n);
+          for_each(stream_, n, ShowStructure{settings_.show, probes, out});
+          times_.trees += trace_timer.milliseconds();
+          rays_ += static_cast<double>(n);
+        } else {
+          colours(rays, out, n);
+        }
         Timer film_timer(stream_);
-        if (settings_.show != Show::picture) for_each(stream_, n, ShowEffort{settings_.show, out});
+        if (settings_.show == Show::rays || settings_.show == Show::samples)
+          for_each(stream_, n, ShowEffort{settings_.show, out});
         for_each(stream_, {begin, end}, AddToFilm{tiling, begin, out, false, film.pixels()});
         times_.film += film_timer.milliseconds();
         indices_per_ms_ = static_cast<double>(n) / std::max(band_timer.milliseconds(), 1e-3);

@@ -13,44 +13,12 @@
 
 namespace trilha {
 
-/// Brute force over a scene's triangles by chapter 01's loops, and over its spheres and planes.
-class BruteForceTracer final : public Tracer {
- public:
-  BruteForceTracer(const WhittedScene& scene, TriangleTest test, const Stream& stream);
-
-  void set_surely_ahead(bool surely_ahead) override { surely_ahead_ = surely_ahead; }
-  bool any_clear() const override { return parted_; }
-  void closest(Among among, const Ray* rays, Hit* hits, std::size_t n) const override;
-  void occluded(Among among, const Ray* rays, std::uint8_t* occluded, std::size_t n) const override;
-  void meets(const Ray* rays, const std::uint32_t* primitives, std::uint8_t* met,
-             std::size_t n) const override;
-
- private:
-  /// Some of the primitives; those of each kind lie together.
-  struct Part {
-    std::uint32_t first = 0, count = 0;  ///< of its triangles
-    Spheres<float> spheres{};
-    Planes<float> planes{};
-    Buffer<float> numbers;
-  };
-  const Part& part(Among among) const {
-    return parts_[static_cast<int>(among == Among::opaque && !parted_ ? Among::all : among)];
-  }
-
-  Stream stream_;
-  TriangleTest test_;
-  ShadingView view_;
-  bool surely_ahead_ = true;
-  bool parted_ = false;  ///< else all is opaque
-  Part parts_[3];
-};
-
 class WhittedRenderer {
  public:
-  /// Split kernels ask the tracer that is made; by default brute force. Throws what WhittedScene and the
-  /// tracer do, DeviceError if the backend is missing, Cancelled in work that was cancelled.
+  /// Split kernels ask the structure that is made; by default brute force. Throws what WhittedScene and the
+  /// structure do, DeviceError if the backend is missing, Cancelled in work that was cancelled.
   WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream,
-                  const MakeTracer& make_tracer = {});
+                  const MakeStructure& make_structure = {});
   ~WhittedRenderer();
 
   /// Adds sample number `sample` to every pixel; of the adaptive method, all of it. keep_going(fraction) is
@@ -116,6 +84,7 @@ class WhittedRenderer {
   std::uint64_t overflows_ = 0;
   Scratch<Ray> sample_rays_;
   Scratch<vec4> colours_, pixels_;
+  Scratch<Probe> probes_;
   Scratch<std::uint64_t> counts_;
   Scratch<Square> squares_, next_squares_;
   Scratch<std::uint8_t> flags_;
