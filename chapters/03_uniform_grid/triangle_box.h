@@ -24,22 +24,24 @@ struct CellFrame {
   }
 };
 
+/// A triangle seen from the grid's corner.
 struct TriangleCorners {
   dvec3 a, b, c;
+  bool can_be_hit;
 };
 
-/// The corners of triangle i, seen from `origin`.
-TRILHA_HD inline TriangleCorners corners_of(const TriangleList& list, std::size_t i, const dvec3& origin) {
-  const uvec3 t = list.triangles[i];
-  return {dvec3(list.positions[t.x]) - origin, dvec3(list.positions[t.y]) - origin,
-          dvec3(list.positions[t.z]) - origin};
+/// No ray can hit what is not finite, or a point.
+TRILHA_HD inline bool can_be_hit(const vec3& a, const vec3& b, const vec3& c) {
+  for (int k = 0; k < 3; ++k)
+    if (!(a[k] - a[k] == 0 && b[k] - b[k] == 0 && c[k] - c[k] == 0)) return false;
+  return !(a == b && b == c);
 }
 
-/// No ray can hit what is not finite, or a point.
-TRILHA_HD inline bool can_be_hit(const TriangleCorners& t) {
-  for (int k = 0; k < 3; ++k)
-    if (!(t.a[k] - t.a[k] == 0 && t.b[k] - t.b[k] == 0 && t.c[k] - t.c[k] == 0)) return false;
-  return !(t.a == t.b && t.b == t.c);
+/// Triangle i, seen from `origin`.
+TRILHA_HD inline TriangleCorners corners_of(const TriangleList& list, std::size_t i, const dvec3& origin) {
+  const uvec3 t = list.triangles[i];
+  const vec3 a = list.positions[t.x], b = list.positions[t.y], c = list.positions[t.z];
+  return {dvec3(a) - origin, dvec3(b) - origin, dvec3(c) - origin, can_be_hit(a, b, c)};
 }
 
 /// The cells of a triangle's box: from low to high along each axis, both included.
@@ -47,7 +49,7 @@ struct CellRange {
   ivec3 low{0}, high{-1};
 
   TRILHA_HD static CellRange of(const TriangleCorners& t, const CellFrame& frame) {
-    if (!can_be_hit(t)) return {};
+    if (!t.can_be_hit) return {};
     CellRange range;
     const double margin = frame.margin * (1 + 1.0 / 64);  // a little more than what the cells have
     for (int k = 0; k < 3; ++k) {

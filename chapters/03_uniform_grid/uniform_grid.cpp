@@ -17,9 +17,8 @@ struct TriangleBoxes {
 
   TRILHA_HD void operator()(std::size_t i) const {
     const TriangleCorners t = corners_of(list, i, dvec3(0));
-    const bool listed = can_be_hit(t);
-    boxes[i] = listed ? united(united(united(Box{}, vec3(t.a)), vec3(t.b)), vec3(t.c)) : Box{};
-    left_out[i] = listed ? 0 : 1;
+    boxes[i] = t.can_be_hit ? united(united(united(Box{}, vec3(t.a)), vec3(t.b)), vec3(t.c)) : Box{};
+    left_out[i] = t.can_be_hit ? 0 : 1;
   }
 };
 
