@@ -54,7 +54,8 @@ struct SortLists {
 };
 
 /// The first cell whose list starts at or after entry `at`.
-TRILHA_HD inline std::uint32_t first_cell_from(const std::uint32_t* starts, std::uint32_t cells, std::uint64_t at) {
+TRILHA_HD inline std::uint32_t first_cell_from(const std::uint32_t* starts, std::uint32_t cells,
+                                               std::uint64_t at) {
   std::uint32_t low = 0, high = cells;
   while (low < high) {
     const std::uint32_t middle = low + (high - low) / 2;
@@ -117,7 +118,8 @@ void sort_lists(const Stream& stream, const GridView& grid, Buffer<std::uint32_t
   for_each(stream, pieces + 1, PieceStarts{grid.starts, cells, piece, on_backend.data()});
   const std::vector<std::uint32_t> first = on_backend.to_vector(stream);
   std::uint64_t largest = 0;
-  for (std::size_t i = 0; i < pieces; ++i) largest = std::max<std::uint64_t>(largest, first[i + 1] - first[i]);
+  for (std::size_t i = 0; i < pieces; ++i)
+    largest = std::max<std::uint64_t>(largest, first[i + 1] - first[i]);
   Buffer<std::uint64_t> keys(stream.backend(), largest);
   const int number_bits = bits_of(triangles - 1), key_bits = number_bits + bits_of(cells - 1);
   for (std::size_t i = 0; i < pieces; ++i) {

@@ -1,14 +1,14 @@
 #pragma once
-// Skipping empty space, which Ordeix & Cioli 2010 leave for later: an empty cell knows how far the next occupied one
-// is (the distance transform of Cohen & Sheffer 1994, "proximity clouds"), and a ray jumps out of the cube of
-// empty cells around it.
+// Skipping empty space, which Ordeix & Cioli 2010 leave for later: an empty cell knows how far the next
+// occupied one is (the distance transform of Cohen & Sheffer 1994, "proximity clouds"), and a ray jumps out
+// of the cube of empty cells around it.
 
 #include "chapters/03_uniform_grid/uniform_grid.h"
 
 namespace trilha {
 
-/// Of each cell, a byte: how many cells away, in the largest of the three directions (Chebyshev), the nearest is that
-/// has triangles. 0 for a cell that has some; farthest_jump stands for all that is as far or further.
+/// Of each cell, a byte: how many cells away, in the largest of the three directions (Chebyshev), the nearest
+/// is that has triangles. 0 for a cell that has some; farthest_jump stands for all that is as far or further.
 constexpr int farthest_jump = 255;
 
 /// Three passes, an axis each. Throws Cancelled.
@@ -43,7 +43,7 @@ TRILHA_HD void walk_skipping(const GridView& grid, const std::uint8_t* distances
   z.put(z.cell_at(enter, T(grid.cells_per_unit.z), 0, z.count - 1));
   constexpr T infinity = std::numeric_limits<T>::infinity();
   for (;;) {
-    const std::uint32_t cell = grid.number({x.index, y.index, z.index});
+    const std::uint32_t cell = grid.number(x.index, y.index, z.index);
     const std::int32_t radius = static_cast<std::int32_t>(distances[cell]) - 1;  // −1: it is occupied
     if (radius <= 0) {
       const T t_leave = min(min(x.crossing, y.crossing), z.crossing);
@@ -59,8 +59,8 @@ TRILHA_HD void walk_skipping(const GridView& grid, const std::uint8_t* distances
     const T t = min(min(leave_x, leave_y), leave_z);
     if (visit.skip(t) || !(t < infinity)) return;
     const bool by_x = leave_x == t, by_y = !by_x && leave_y == t, by_z = !by_x && !by_y;
-    if (!(jump(x, t, grid.cells_per_unit.x, radius, by_x) && jump(y, t, grid.cells_per_unit.y, radius, by_y) &&
-          jump(z, t, grid.cells_per_unit.z, radius, by_z)))
+    if (!(jump(x, t, grid.cells_per_unit.x, radius, by_x) &&
+          jump(y, t, grid.cells_per_unit.y, radius, by_y) && jump(z, t, grid.cells_per_unit.z, radius, by_z)))
       return;
   }
 }

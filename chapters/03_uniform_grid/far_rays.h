@@ -9,7 +9,8 @@
 
 namespace trilha {
 
-/// How far beside the ray, along each axis, a triangle may lie that is reported to be hit: see uniform_grid.h.
+/// How far beside the ray, along each axis, a triangle may lie that is reported to be hit: see
+/// uniform_grid.h.
 template <class Grid, class T>
 TRILHA_HD inline double rounding_of(const Grid& grid, const RayOf<T>& ray) {
   double farthest = 0, size = 0, longest = 0;
@@ -27,8 +28,9 @@ template <class Grid, class T>
 TRILHA_HD inline bool asks_all(const Grid& grid, const RayOf<T>& ray) {
   if (grid.resolution.x == 0) return true;
   if (is_near(grid, ray)) return false;
-  const double size = max(max(double(grid.cell.x) * grid.resolution.x, double(grid.cell.y) * grid.resolution.y),
-                          double(grid.cell.z) * grid.resolution.z);
+  const double size =
+      max(max(double(grid.cell.x) * grid.resolution.x, double(grid.cell.y) * grid.resolution.y),
+          double(grid.cell.z) * grid.resolution.z);
   return rounding_of(grid, ray) > size / 4;
 }
 
@@ -59,7 +61,7 @@ TRILHA_HD void walk_slices(const Grid& grid, const RayOf<T>& ray, Visit& visit) 
     t0 = max(t0, double(ray.t_min));
     t1 = min(t1, double(ray.t_max));
     int low[3], high[3];
-    for (const int a : {u, v}) {
+    for (int a = 0; a < 3; ++a) {
       const double p = fma(t0, d[a], o[a]), q = fma(t1, d[a], o[a]);
       // in this order NaN gives the whole range
       low[a] = static_cast<int>(min(max(std::floor((min(p, q) - error) / cell[a]), 0.0), double(n[a])));
@@ -70,7 +72,7 @@ TRILHA_HD void walk_slices(const Grid& grid, const RayOf<T>& ray, Visit& visit) 
         int c[3];
         c[main] = k, c[u] = i, c[v] = j;
         const bool last = i == high[u] && j == high[v];
-        if (visit(grid.number({c[0], c[1], c[2]}), last ? t_at(ahead, -error) : -infinity)) return;
+        if (visit(grid.number(c[0], c[1], c[2]), last ? t_at(ahead, -error) : -infinity)) return;
       }
   }
 }

@@ -36,8 +36,8 @@ void trace_grid(const Stream& stream, const GridWay& way, const Triangles<Test>&
 }
 
 template <class Test>
-void occluded_grid(const Stream& stream, const GridWay& way, const Triangles<Test>& triangles, const Ray* rays,
-                   std::uint8_t* occluded, std::size_t n) {
+void occluded_grid(const Stream& stream, const GridWay& way, const Triangles<Test>& triangles,
+                   const Ray* rays, std::uint8_t* occluded, std::size_t n) {
   with_grid(way, triangles, [&](const auto& structure) {
     for_each(stream, n, Occlude<std::decay_t<decltype(structure)>>{structure, 0, rays, occluded}, batch);
   });
@@ -51,12 +51,12 @@ void probe_grid(const Stream& stream, const GridWay& way, Query query, const Tri
   });
 }
 
-#define INSTANTIATE(Test)                                                                                      \
-  template void trace_grid(const Stream&, const GridWay&, const Triangles<Test>&, const Ray*, Hit*,            \
-                           std::size_t);                                                                       \
-  template void occluded_grid(const Stream&, const GridWay&, const Triangles<Test>&, const Ray*, std::uint8_t*, \
-                              std::size_t);                                                                    \
-  template void probe_grid(const Stream&, const GridWay&, Query, const Triangles<Test>&, const Ray*, Probe*,   \
+#define INSTANTIATE(Test)                                                                                    \
+  template void trace_grid(const Stream&, const GridWay&, const Triangles<Test>&, const Ray*, Hit*,          \
+                           std::size_t);                                                                     \
+  template void occluded_grid(const Stream&, const GridWay&, const Triangles<Test>&, const Ray*,             \
+                              std::uint8_t*, std::size_t);                                                   \
+  template void probe_grid(const Stream&, const GridWay&, Query, const Triangles<Test>&, const Ray*, Probe*, \
                            std::size_t);
 INSTANTIATE(PlaneBarycentric)
 INSTANTIATE(MollerTrumbore)

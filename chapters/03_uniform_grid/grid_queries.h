@@ -1,5 +1,6 @@
 #pragma once
-// The passes that send rays through a grid, compiled for both machines: by which way, and by which triangle test.
+// The passes that send rays through a grid, compiled for both machines: by which way, and by which triangle
+// test.
 
 #include "chapters/03_uniform_grid/empty_space.h"
 #include "chapters/03_uniform_grid/mailbox.h"
@@ -36,19 +37,19 @@ decltype(auto) with_grid(const GridWay& way, const Primitives& primitives, const
   }
 }
 
-/// The nearest hit of each of n rays; the triangles are those that the grid was built over, prepared for the plain
-/// loop. Pointers are to the stream's backend. Throws Cancelled.
+/// The nearest hit of each of n rays; the triangles are those that the grid was built over, prepared for the
+/// plain loop. Pointers are to the stream's backend. Throws Cancelled.
 template <class Test>
 void trace_grid(const Stream& stream, const GridWay& way, const Triangles<Test>& triangles, const Ray* rays,
                 Hit* hits, std::size_t n);
 
 /// Is there any hit? 1 or 0 for each of n rays.
 template <class Test>
-void occluded_grid(const Stream& stream, const GridWay& way, const Triangles<Test>& triangles, const Ray* rays,
-                   std::uint8_t* occluded, std::size_t n);
+void occluded_grid(const Stream& stream, const GridWay& way, const Triangles<Test>& triangles,
+                   const Ray* rays, std::uint8_t* occluded, std::size_t n);
 
-/// What closest(), or occluded(), did for each of n rays: cells visited and triangles tested. For heat maps and
-/// reports.
+/// What closest(), or occluded(), did for each of n rays: cells visited and triangles tested. For heat maps
+/// and reports.
 template <class Test>
 void probe_grid(const Stream& stream, const GridWay& way, Query query, const Triangles<Test>& triangles,
                 const Ray* rays, Probe* work, std::size_t n);

@@ -1,8 +1,8 @@
 #pragma once
-// Mailboxes (Amanatides & Woo 1987; small and hashed: Wald 2004, §7.3.3): a triangle in many cells is tested once
-// a ray. Each ray remembers which triangles it asked last, in a small table on the stack that needs no clearing
-// between rays and no memory that threads share. A triangle that was asked and did not become the hit cannot become
-// it later, since the hit only comes nearer.
+// Mailboxes (Amanatides & Woo 1987; small and hashed: Wald 2004, §7.3.3): a triangle in many cells is tested
+// once a ray. Each ray remembers which triangles it asked last, in a small table on the stack that needs no
+// clearing between rays and no memory that threads share. A triangle that was asked and did not become the
+// hit cannot become it later, since the hit only comes nearer.
 
 #include "chapters/03_uniform_grid/uniform_grid.h"
 

@@ -6,43 +6,12 @@
 // A cell counts with `margin` around it, which uniform_grid.h derives. All is worked out in double, seen from
 // the grid's corner. Any axis will do as long as both shadows are thrown on the same one, so an error in an
 // axis does no harm; the shadows themselves are sums of products, off by less than 2⁻⁵⁰ of what a margin of
-// the grid's size would throw: cells are taken to be larger by 2⁻⁴⁷ of that. No triangle that touches a cell is
-// left out.
+// the grid's size would throw: cells are taken to be larger by 2⁻⁴⁷ of that. No triangle that touches a cell
+// is left out.
 
-#include "chapters/03_uniform_grid/uniform_grid.h"
+#include "chapters/03_uniform_grid/grid_frame.h"
 
 namespace trilha {
-
-/// The cells in double, for builders.
-struct CellFrame {
-  dvec3 lower{0}, cell{1};
-  ivec3 resolution{1};
-  double margin = 0;
-
-  TRILHA_HD double size() const {
-    return max(max(cell.x * resolution.x, cell.y * resolution.y), cell.z * resolution.z);
-  }
-};
-
-/// A triangle seen from the grid's corner.
-struct TriangleCorners {
-  dvec3 a, b, c;
-  bool can_be_hit;
-};
-
-/// No ray can hit what is not finite, or a point.
-TRILHA_HD inline bool can_be_hit(const vec3& a, const vec3& b, const vec3& c) {
-  for (int k = 0; k < 3; ++k)
-    if (!(a[k] - a[k] == 0 && b[k] - b[k] == 0 && c[k] - c[k] == 0)) return false;
-  return !(a == b && b == c);
-}
-
-/// Triangle i, seen from `origin`.
-TRILHA_HD inline TriangleCorners corners_of(const TriangleList& list, std::size_t i, const dvec3& origin) {
-  const uvec3 t = list.triangles[i];
-  const vec3 a = list.positions[t.x], b = list.positions[t.y], c = list.positions[t.z];
-  return {dvec3(a) - origin, dvec3(b) - origin, dvec3(c) - origin, can_be_hit(a, b, c)};
-}
 
 /// The cells of a triangle's box: from low to high along each axis, both included.
 struct CellRange {
@@ -70,9 +39,7 @@ struct CellRange {
     return c.x >= low.x && c.x <= high.x && c.y >= low.y && c.y <= high.y && c.z >= low.z && c.z <= high.z;
   }
   /// One row: the triangle goes from its first cell to its last and touches all of them.
-  TRILHA_HD bool is_row() const {
-    return (low.x == high.x) + (low.y == high.y) + (low.z == high.z) >= 2;
-  }
+  TRILHA_HD bool is_row() const { return (low.x == high.x) + (low.y == high.y) + (low.z == high.z) >= 2; }
   /// Its cell number i, x first.
   TRILHA_HD ivec3 cell(std::uint32_t i) const {
     const auto nx = static_cast<std::uint32_t>(high.x - low.x + 1),
@@ -111,9 +78,9 @@ struct SeparatingAxes {
         on_edge[e][k] = shadow(t.a[u] * x + t.a[v] * y, t.b[u] * x + t.b[v] * y, t.c[u] * x + t.c[v] * y,
                                half[u] * std::fabs(x) + half[v] * std::fabs(y));
       }
-    on_normal = shadow(glm::dot(t.a, normal), glm::dot(t.b, normal), glm::dot(t.c, normal),
-                       half.x * std::fabs(normal.x) + half.y * std::fabs(normal.y) +
-                           half.z * std::fabs(normal.z));
+    on_normal =
+        shadow(glm::dot(t.a, normal), glm::dot(t.b, normal), glm::dot(t.c, normal),
+               half.x * std::fabs(normal.x) + half.y * std::fabs(normal.y) + half.z * std::fabs(normal.z));
   }
 
   TRILHA_HD bool touch(const ivec3& c) const {

@@ -23,11 +23,10 @@
 // further away, and directions so short or long that products leave float's range, go by far_rays.h.
 
 #include <limits>
-#include <string>
 
 #include "chapters/01_ray_casting/ray_casting.h"
 #include "chapters/03_uniform_grid/far_rays.h"
-#include "chapters/03_uniform_grid/grid_resolution.h"
+#include "chapters/03_uniform_grid/grid_settings.h"
 
 namespace trilha {
 
@@ -48,8 +47,8 @@ struct GridView {
     return static_cast<std::uint32_t>(resolution.x) * static_cast<std::uint32_t>(resolution.y) *
            static_cast<std::uint32_t>(resolution.z);
   }
-  TRILHA_HD std::uint32_t number(const ivec3& c) const {
-    return static_cast<std::uint32_t>(c.x + resolution.x * (c.y + resolution.y * c.z));
+  TRILHA_HD std::uint32_t number(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    return static_cast<std::uint32_t>(x + resolution.x * (y + resolution.y * z));
   }
   TRILHA_HD ivec3 place(std::uint32_t number) const {
     const auto n = static_cast<std::int32_t>(number), rest = n / resolution.x;
@@ -129,7 +128,7 @@ TRILHA_HD void walk(const GridView& grid, const RayOf<T>& ray, Visit& visit) {
   y.put(y.cell_at(enter, T(grid.cells_per_unit.y), 0, y.count - 1));
   z.put(z.cell_at(enter, T(grid.cells_per_unit.z), 0, z.count - 1));
   const std::int32_t step_y = y.step * x.count, step_z = z.step * x.count * y.count;
-  std::uint32_t cell = grid.number({x.index, y.index, z.index});
+  std::uint32_t cell = grid.number(x.index, y.index, z.index);
   for (;;) {
     const T t_leave = min(min(x.crossing, y.crossing), z.crossing);
     if (visit(cell, t_leave) || !(t_leave < std::numeric_limits<T>::infinity())) return;
@@ -149,10 +148,10 @@ TRILHA_HD void walk(const GridView& grid, const RayOf<T>& ray, Visit& visit) {
 // ---- the structure -----------------------------------------------------------
 
 /// Asks the primitives of each cell, and stops when no later cell can change the answer.
-template <Query query, class Primitives, class ProbeType>
+template <Query query, class Primitives, class ProbeType, class Cells = GridView>
 struct AskCell {
   using T = typename Primitives::Scalar;
-  const GridView& grid;
+  const Cells& grid;
   const Primitives& primitives;
   const RayOf<T>& ray;
   ProbeType& probe;
@@ -200,42 +199,6 @@ struct UniformGrid {
 
 // ---- what builds it ----------------------------------------------------------
 
-/// The triangles that a grid is built over. Pointers are to the backend.
-struct TriangleList {
-  const vec3* positions;
-  const uvec3* triangles;
-  std::uint32_t count;
-};
-
-/// Per object: each triangle goes to the cells of its box that it touches. Brute force: each cell asks every
-/// triangle. Both make the same cells, bit for bit (both after Ordeix & Cioli 2010, chapter 4).
-enum class GridBuilder { per_object, brute_force };
-
-struct GridSettings {
-  ResolutionSettings resolution;
-  GridBuilder builder = GridBuilder::per_object;
-  std::size_t most_bytes = std::size_t{1} << 29;  ///< of the finished grid; the resolution is lowered to fit
-  /// The longest list that one thread sorts; 0: what suits the backend.
-  std::uint32_t longest_alone = 0;
-};
-
-/// Milliseconds of each stage of a build.
-struct GridBuildTimes {
-  double bounds = 0, resolution = 0, overlap = 0, scan = 0, fill = 0, sort = 0;
-  double total() const { return bounds + resolution + overlap + scan + fill + sort; }
-};
-
-/// What was built, and what it took.
-struct GridStatistics {
-  GridResolution resolution;      ///< asked, given, and why they differ
-  std::uint32_t left_out = 0;     ///< triangles that no ray can hit: not finite, or a point
-  std::uint64_t references = 0;   ///< entries of all lists
-  std::uint64_t box_cells = 0;    ///< cells in the triangles' boxes: overlap tests that were made
-  std::uint32_t longest = 0;      ///< entries of the longest list
-  std::size_t bytes = 0;          ///< of the finished grid
-  GridBuildTimes times;
-};
-
 struct Grid {
   GridView view;  ///< into the buffers
   GridStatistics statistics;
@@ -246,8 +209,5 @@ struct Grid {
 /// has no cells, and rays ask directly. The same goes where most_bytes does not hold a list of each triangle
 /// once. While it works it takes some 16 bytes a triangle and 4 a cell more. Throws Cancelled.
 Grid build_grid(const Stream& stream, const TriangleList& triangles, const GridSettings& settings);
-
-/// The cells that the ray crosses up to t_end, as boxes, in their order: what a window draws.
-std::vector<Box> crossed_cells(const GridView& grid, const Ray& ray, float t_end);
 
 }  // namespace trilha

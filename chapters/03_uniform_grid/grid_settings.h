@@ -1,5 +1,5 @@
 #pragma once
-// How many cells a grid has along each axis.
+// What a grid is asked to be, how many cells it therefore has along each axis, and what is told of it.
 
 #include <algorithm>
 #include <cmath>
@@ -25,12 +25,12 @@ struct ResolutionSettings {
 
 /// Why a grid has fewer cells than were asked for.
 namespace lowered_for {
-constexpr unsigned flat = 1;        ///< along an axis the scene is not deeper than rounding errors
-constexpr unsigned precision = 2;   ///< cells would not be much larger than rounding errors
-constexpr unsigned cells = 4;       ///< the cells alone would take more than half of most_bytes
-constexpr unsigned work = 8;        ///< triangles' boxes have too many cells: more than most_box_cells
-constexpr unsigned references = 16; ///< the lists would take more than most_bytes
-constexpr unsigned no_grid = 32;    ///< not even one cell fits; all triangles are asked
+constexpr unsigned flat = 1;         ///< along an axis the scene is not deeper than rounding errors
+constexpr unsigned precision = 2;    ///< cells would not be much larger than rounding errors
+constexpr unsigned cells = 4;        ///< the cells alone would take more than half of most_bytes
+constexpr unsigned work = 8;         ///< triangles' boxes have too many cells: more than most_box_cells
+constexpr unsigned references = 16;  ///< the lists would take more than most_bytes
+constexpr unsigned no_grid = 32;     ///< not even one cell fits; all triangles are asked
 }  // namespace lowered_for
 
 struct GridResolution {
@@ -120,5 +120,43 @@ inline GridResolution resolve(const ResolutionSettings& settings, const dvec3& e
   }
   return r;
 }
+
+// ---- settings and statistics ---------------------------------------------------
+
+/// The triangles that a grid is built over. Pointers are to the backend.
+struct TriangleList {
+  const vec3* positions;
+  const uvec3* triangles;
+  std::uint32_t count;
+};
+
+/// Per object: each triangle goes to the cells of its box that it touches. Brute force: each cell asks every
+/// triangle. Both make the same cells, bit for bit (both after Ordeix & Cioli 2010, chapter 4).
+enum class GridBuilder { per_object, brute_force };
+
+struct GridSettings {
+  ResolutionSettings resolution;
+  GridBuilder builder = GridBuilder::per_object;
+  std::size_t most_bytes = std::size_t{1} << 29;  ///< of the finished grid; the resolution is lowered to fit
+  /// The longest list that one thread sorts; 0: what suits the backend.
+  std::uint32_t longest_alone = 0;
+};
+
+/// Milliseconds of each stage of a build.
+struct GridBuildTimes {
+  double bounds = 0, resolution = 0, overlap = 0, scan = 0, fill = 0, sort = 0;
+  double total() const { return bounds + resolution + overlap + scan + fill + sort; }
+};
+
+/// What was built, and what it took.
+struct GridStatistics {
+  GridResolution resolution;     ///< asked, given, and why they differ
+  std::uint32_t left_out = 0;    ///< triangles that no ray can hit: not finite, or a point
+  std::uint64_t references = 0;  ///< entries of all lists
+  std::uint64_t box_cells = 0;   ///< cells in the triangles' boxes: overlap tests that were made
+  std::uint32_t longest = 0;     ///< entries of the longest list
+  std::size_t bytes = 0;         ///< of the finished grid
+  GridBuildTimes times;
+};
 
 }  // namespace trilha
