@@ -98,25 +98,35 @@ struct KdRay {
     constexpr T rounded = static_cast<T>(gamma<T>(32));
     slack = fma(rounded, reach, 4 * std::numeric_limits<T>::min());
     origin = ray.origin;
-    begin = ray.t_min * speed;
-    end = std::numeric_limits<T>::infinity();
     if (!(reach < T(0x1p96f))) {  // what follows could overflow: every leaf is visited
-      origin = inverse = Vec3<T>(0);
-      slack = std::numeric_limits<T>::infinity();
+      origin = Vec3<T>(0);
       inverse = Vec3<T>(1);
-      begin = -slack;
-      return true;
+      slack = std::numeric_limits<T>::infinity();
+    } else {
+      for (int k = 0; k < 3; ++k) {
+        const T slope = d[k] / speed;
+        inverse[k] = 1 / (std::fabs(slope) >= unit_roundoff<T> ? slope : std::copysign(unit_roundoff<T>, d[k]));
+      }
     }
-    for (int k = 0; k < 3; ++k) {
-      T slope = d[k] / speed;
-      if (!(std::fabs(slope) >= unit_roundoff<T>)) slope = std::copysign(unit_roundoff<T>, d[k]);
-      inverse[k] = 1 / slope;
-      const T wide = slack * std::fabs(inverse[k]);
-      const T a = (lower[k] - origin[k]) * inverse[k], b = (upper[k] - origin[k]) * inverse[k];
-      begin = quick_max(begin, quick_min(a, b) - wide);
-      end = quick_min(end, quick_max(a, b) + wide);
-    }
+    const Range range = within(tree.bounds, ray.t_min * speed, ray.t_max * speed);
+    begin = range.begin;
+    end = range.end;
     return begin <= end;
+  }
+
+  /// Where between `from` and `to` the ray is in a box that is widened.
+  struct Range {
+    T begin, end;
+  };
+  TRILHA_HD Range within(const Box& box, T from, T to) const {
+    Range range{from, to};
+    for (int k = 0; k < 3; ++k) {
+      const T a = (static_cast<T>(box.lower[k]) - origin[k]) * inverse[k];
+      const T b = (static_cast<T>(box.upper[k]) - origin[k]) * inverse[k];
+      range.begin = quick_max(range.begin, fma(-slack, std::fabs(inverse[k]), quick_min(a, b)));
+      range.end = quick_min(range.end, fma(slack, std::fabs(inverse[k]), quick_max(a, b)));
+    }
+    return range;
   }
 
   TRILHA_HD Crossing cross(const KdNode& node) const {
