@@ -54,7 +54,7 @@ __global__ void __launch_bounds__(kd_warp_threads)
       const bool in_right = __any_sync(everyone, right_begin <= quick_min(right_end, nearest)) != 0;
       const bool to_left = in_left && (!in_right || (upwards >> node.axis() & 1) != 0);
       if (in_left && in_right) {
-        stack[height] = node.child() + (to_left ? 1 : 0);  // the same from every thread
+        if (threadIdx.x % 32 == 0) stack[height] = node.child() + (to_left ? 1 : 0);
         begins[height] = to_left ? right_begin : left_begin;
         ends[height] = to_left ? right_end : left_end;
         ++height;
@@ -73,9 +73,10 @@ __global__ void __launch_bounds__(kd_warp_threads)
     do {
       more = height > 0;
       if (!more) break;
-      __syncwarp();
       --height;
+      __syncwarp();  // it has been written
       number = stack[height];
+      __syncwarp();  // and read by all, before it is written again
       begin = begins[height];
       end = ends[height];
     } while (!__any_sync(everyone, begin <= quick_min(end, nearest)));

@@ -30,7 +30,7 @@ struct KdTraced {
 /// Calls function(structure) with the tree over the primitives as it is walked; packets have none of their own
 /// for one ray, and give that of the stack.
 template <class Primitives, class Function>
-TRILHA_HD decltype(auto) with_kd_walk(const KdTraced& traced, const Primitives& primitives, const Function& function) {
+decltype(auto) with_kd_walk(const KdTraced& traced, const Primitives& primitives, const Function& function) {
   switch (traced.traversal) {
     case KdTraversal::restart:
       return function(KdTree<Primitives, KdRestartWalk>{traced.tree, primitives, {}});
