@@ -199,7 +199,7 @@ void WhittedDemo::build(const Scene& scene, const Stream& stream) {
   scene_ = &scene;
   inspector_.reset();
   renderer_.reset();
-  renderer_.emplace(scene, settings_, stream, structure());
+  renderer_.emplace(scene, settings_, stream, structure(false));
 }
 
 bool WhittedDemo::add_sample(Film& film, const SampleRequest& request) {
@@ -218,7 +218,7 @@ Display WhittedDemo::display() const {
     display.most = 64;
     display.counted = "rays of a tree";
   } else if (shows_structure(settings_.show)) {
-    display.most = 128;
+    display.most = 64;
     display.counted = settings_.show == Show::visited ? visited() + " visited" : "triangles tested";
   } else {
     // a pixel's own corner, and five for every quartering
@@ -248,7 +248,7 @@ Inspection WhittedDemo::inspect(const Camera& camera, int width, int height, int
   if (!inspector_) {  // the tree is laid open on the host
     WhittedSettings as_shown = settings_;
     as_shown.kernel = Kernel::split;
-    inspector_.emplace(*scene_, as_shown, Backend::cpu, structure());
+    inspector_.emplace(*scene_, as_shown, Backend::cpu, structure(true));
   }
   inspector_->set(settings_);
   Ray eye = PinholeCamera::make(camera, width, height)

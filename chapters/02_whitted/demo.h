@@ -32,8 +32,9 @@ class WhittedDemo : public Demo {
   std::vector<StabilityCase> extreme_cases() const override;
 
  protected:
-  /// Makes the structure that the settings ask for; none: brute force.
-  virtual MakeStructure structure() { return {}; }
+  /// Makes the structure that the settings ask for: for the picture, or on the host, to look into. None: brute
+  /// force.
+  virtual MakeStructure structure(bool /*on_host*/) { return {}; }
   /// What a ray visits in it: "cells", "nodes"; "": there is no structure.
   virtual std::string visited() const { return ""; }
 

@@ -208,7 +208,7 @@ bool WhittedRenderer::add_pattern(Film& film, const PinholeCamera& camera, std::
           Probe* probes = probes_.at_least(stream_.backend(), n);
           tracer_->probe(rays, probes, n);
           for_each(stream_, n, ShowStructure{settings_.show, probes, out});
-          times_.trees += trace_timer.milliseconds();
+          times_.trace += trace_timer.milliseconds();
           rays_ += static_cast<double>(n);
         } else {
           colours(rays, out, n);

@@ -60,6 +60,7 @@ class WhittedRenderer {
   WhittedTimes times() const {
     WhittedTimes all = split_.times();
     all.rays = times_.rays, all.trees = times_.trees, all.film = times_.film;
+    all.trace += times_.trace;
     return all;
   }
 

@@ -12,7 +12,7 @@ namespace {
 
 /// Triangle → how many cells its box has.
 struct BoxCells {
-  TriangleList list;
+  TriangleArrays list;
   CellFrame frame;
   std::uint64_t* counts;
 
@@ -23,7 +23,7 @@ struct BoxCells {
 
 /// Item → which of its cells the triangle touches, a bit each; and counts them in the cells.
 struct FindOverlaps {
-  TriangleList list;
+  TriangleArrays list;
   CellFrame frame;
   GridView grid;
   Runs runs;
@@ -67,7 +67,7 @@ struct FindOverlaps {
 /// Item → its triangle's number in the lists of the cells that it touches, each list filled from its end in
 /// the order in which threads come.
 struct FillLists {
-  TriangleList list;
+  TriangleArrays list;
   CellFrame frame;
   GridView grid;
   Runs runs;
@@ -90,7 +90,7 @@ struct FillLists {
 /// The builder per object, and what it keeps from one resolution that was too fine to the next.
 class PerObject {
  public:
-  PerObject(const Stream& stream, const TriangleList& list)
+  PerObject(const Stream& stream, const TriangleArrays& list)
       : stream_(stream), list_(list), box_cells_(stream.backend(), list.count) {}
 
   std::uint64_t box_cells(const CellFrame& frame) {
@@ -116,7 +116,7 @@ class PerObject {
 
  private:
   Stream stream_;
-  TriangleList list_;
+  TriangleArrays list_;
   Buffer<std::uint64_t> box_cells_;
   Buffer<std::uint32_t> further_, overlaps_;
   std::size_t items_ = 0;
@@ -124,7 +124,7 @@ class PerObject {
 
 }  // namespace
 
-Grid build_grid(const Stream& stream, const TriangleList& list, const GridSettings& settings) {
+Grid build_grid(const Stream& stream, const TriangleArrays& list, const GridSettings& settings) {
   Grid grid;
   GridStatistics& statistics = grid.statistics;
   if (list.count < 2) return grid;
