@@ -200,6 +200,10 @@ class RtGpu {
   /// What its kernel takes of a CUDA device; nothing on the CPU.
   std::optional<KernelCost> cost() const;
 
+  /// The scene as RT-GPU has it, or as the two others: for structures of later chapters.
+  RtGlobalView global_view() const { return {{}, list_.data()}; }
+  const RtTextureView& texture_view() const { return texture_view_; }
+
  private:
   Texels texels(Buffer<vec4>& buffer, const std::vector<vec4>& values);
 
