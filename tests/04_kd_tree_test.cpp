@@ -100,7 +100,8 @@ std::vector<Ray> hard_rays(const Mesh& mesh, const BuiltKdTree& tree, std::size_
     if (kind == 7) ray.direction[axis] = random.index(2) == 0 ? 1e-42f : -1e-42f;
     if (kind == 8) ray.direction *= 1e-35f / largest;
     if (kind == 9) ray.direction *= 1e18f / largest;
-    if (kind == 10) ray.origin = vec3(axis == 0 ? bounds.lower.x : bounds.upper.x, bounds.lower.y, bounds.upper.z);
+    if (kind == 10)
+      ray.origin = vec3(axis == 0 ? bounds.lower.x : bounds.upper.x, bounds.lower.y, bounds.upper.z);
     if (kind == 11 && i % 5 == 0) {
       const float odd[] = {nan, INFINITY, -INFINITY, 3e38f, 0.0f};
       (random.index(2) == 0 ? ray.origin : ray.direction)[axis] = odd[random.index(5)];
@@ -108,8 +109,9 @@ std::vector<Ray> hard_rays(const Mesh& mesh, const BuiltKdTree& tree, std::size_
     }
     if (i % 4 == 0) {
       const float t = random.uniform(0, 2);
-      const std::pair<float, float> intervals[] = {{0, t},   {t, INFINITY}, {t, t},   {t, t / 2}, {-INFINITY, INFINITY},
-                                                   {nan, 1}, {0, nan},      {-t, t},  {t / 2, t}};
+      const std::pair<float, float> intervals[] = {
+          {0, t},   {t, INFINITY}, {t, t},  {t, t / 2}, {-INFINITY, INFINITY},
+          {nan, 1}, {0, nan},      {-t, t}, {t / 2, t}};
       std::tie(ray.t_min, ray.t_max) = intervals[random.index(9)];
     }
   }
@@ -120,8 +122,9 @@ std::vector<Ray> hard_rays(const Mesh& mesh, const BuiltKdTree& tree, std::size_
 struct Differences {
   std::size_t closest = 0, occluded = 0;
 };
-Differences differences(const Prepared<>& there, const KdTraced& traced, const Triangles<Watertight>& triangles,
-                        const std::vector<Ray>& rays, const std::vector<Hit>& expected) {
+Differences differences(const Prepared<>& there, const KdTraced& traced,
+                        const Triangles<Watertight>& triangles, const std::vector<Ray>& rays,
+                        const std::vector<Hit>& expected) {
   const Buffer<Ray> asked(there.stream, rays);
   Buffer<Hit> hits(there.stream.backend(), rays.size());
   const Buffer<std::uint8_t> none(there.stream, std::vector<std::uint8_t>(rays.size(), 7));
@@ -144,8 +147,8 @@ KdTraced traced_by(const Prepared<>& there, KdTraversal traversal, int places = 
 
 }  // namespace
 
-// Catches: a cell left out or left too soon, an order mistaken, a tie given to the wrong triangle, a trail or a
-// stack that loses its place, 0·∞ on a plane, an interval that is left; by any rule, traversal and machine.
+// Catches: a cell left out or left too soon, an order mistaken, a tie given to the wrong triangle, a trail or
+// a stack that loses its place, 0·∞ on a plane, an interval that is left; by any rule, traversal and machine.
 TEST_CASE("every traversal gives the hits of brute force, bit for bit, in every scene") {
   static_assert(sizeof(KdNode) == 8);
   std::size_t rays_in_all = 0, hits_in_all = 0;
@@ -169,7 +172,8 @@ TEST_CASE("every traversal gives the hits of brute force, bit for bit, in every 
           for (const KdTraversal traversal : all_kd_traversals) {
             const auto [closest, occluded] =
                 differences(there, traced_by(there, traversal), triangles, rays, expected);
-            INFO(scene << ", " << name(rule) << ", " << name(traversal) << ", kind " << kind << " on " << name(backend));
+            INFO(scene << ", " << name(rule) << ", " << name(traversal) << ", kind " << kind << " on "
+                       << name(backend));
             CHECK(closest == 0);
             CHECK(occluded == 0);
           }
@@ -198,7 +202,8 @@ TEST_CASE("a short stack of any size gives the same hits") {
       CHECK(occluded == 0);
       const Buffer<Ray> asked(there.stream, rays);
       Buffer<Probe> probes(backend, rays.size());
-      probe_kd_tree(there.stream, traced, there.triangles, Query::closest, asked.data(), probes.data(), rays.size());
+      probe_kd_tree(there.stream, traced, there.triangles, Query::closest, asked.data(), probes.data(),
+                    rays.size());
       for (const Probe& probe : probes.to_vector(there.stream)) visits[places] += probe.nodes_visited;
     }
     CHECK(visits[1] > visits[4]);
@@ -220,8 +225,8 @@ TEST_CASE("all walks test the same leaves, and none takes a path twice") {
       probe_kd_tree(here.stream, traced_by(here, KdTraversal::stack), here.triangles, query, rays.data(),
                     by_stack.data(), rays.size());
       for (const KdTraversal traversal : all_kd_traversals) {
-        probe_kd_tree(here.stream, traced_by(here, traversal, 2), here.triangles, query, rays.data(), probes.data(),
-                      rays.size());
+        probe_kd_tree(here.stream, traced_by(here, traversal, 2), here.triangles, query, rays.data(),
+                      probes.data(), rays.size());
         std::size_t other = 0, too_many = 0;
         for (std::size_t i = 0; i < rays.size(); ++i) {
           // what a box says of the ray's place, the path may say a rounding otherwise
@@ -278,8 +283,8 @@ TEST_CASE("every traversal is watertight") {
         const dvec3 centre = glm::normalize(dvec3(148376, 1234, -223423)) * (c.offset * c.size);
         const Mesh mesh = make(c.size, centre);
         const Prepared<> there(backend, mesh, {});
-        const ClosedMesh closed{there.positions.data(), there.corners.data(), there.triangles.count, centre, c.size,
-                                false};
+        const ClosedMesh closed{
+            there.positions.data(), there.corners.data(), there.triangles.count, centre, c.size, false};
         for (const Aim aim : {Aim::anywhere, Aim::edges, Aim::vertices}) {
           for (const KdTraversal traversal : all_kd_traversals)
             with_kd_walk(traced_by(there, traversal), there.triangles, [&](const auto& structure) {
@@ -294,8 +299,8 @@ TEST_CASE("every traversal is watertight") {
             });
           // packets, whose rays come together
           std::vector<Ray> together(effort(3000));
-          const ClosedMesh host{mesh.positions.data(), mesh.triangles.data(), there.triangles.count, centre, c.size,
-                                false};
+          const ClosedMesh host{
+              mesh.positions.data(), mesh.triangles.data(), there.triangles.count, centre, c.size, false};
           const WatertightTrial<int, Watertight> trial{0, host, aim, 35, 1, {}, {}, {}, {}, {}};
           for (std::size_t i = 0; i < together.size(); ++i) {
             Random random(36, i);
