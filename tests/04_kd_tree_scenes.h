@@ -101,6 +101,8 @@ inline std::vector<NamedMesh> hard_scenes() {
   add("spiky sphere", spiky_sphere(15, 15, 1));
   add("size 1e-18", soup(500, 0.2f, 7, 1e-18f));
   add("size 1e18", soup(500, 0.2f, 8, 1e18f));
+  add("size 1e-40", soup(60, 0.2f, 16, 1e-40f));
+  add("size 1e30", soup(60, 0.2f, 17, 1e30f));
   add("1e5 sizes away", soup(500, 0.2f, 9, 1, {66319.0f, 551.0f, -74843.0f}));
   Mesh flat = soup(400, 0.2f, 10);
   for (vec3& p : flat.positions) p.y = 0.25f;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <memory>
 
 #include "chapters/04_kd_tree/kd_tree.h"
 
@@ -57,33 +56,5 @@ void for_each_plane(const KdEvent* events, std::size_t n, std::uint32_t count, f
     left += kinds[1] + kinds[2];
   }
 }
-
-/// A vector that only grows and never clears what it grows by.
-template <class T>
-struct Room {
-  std::unique_ptr<T[]> data;
-  std::size_t size = 0;
-
-  T* of(std::size_t n) {
-    if (n > size) data.reset(new T[size = std::max(n, size + size / 2)]);
-    return data.get();
-  }
-};
-
-/// The primitives of a node, in ascending order, and the sorted events of what of them lies in the node. The
-/// events' primitives are numbers within the node.
-struct Fragments {
-  std::uint32_t count = 0;
-  std::size_t event_count[3] = {};
-  Room<std::uint32_t> primitives;
-  Room<KdEvent> events[3];
-
-  /// Makes room for n primitives, of which there are none yet.
-  void reset(std::uint32_t n) {
-    count = 0;
-    primitives.of(n + 1);
-    for (int k = 0; k < 3; ++k) events[k].of(2 * std::size_t{n} + 1), event_count[k] = 0;
-  }
-};
 
 }  // namespace trilha

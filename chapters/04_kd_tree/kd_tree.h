@@ -2,8 +2,7 @@
 // The kd-tree: space is halved by planes across the axes, again and again, where the surface-area heuristic
 // says that rays will save most. Read from top to bottom: the tree, what a ray needs to walk it, the walk
 // with a stack; then kd_tree.cpp, which builds. restart.h, backtrack.h, push_down.h, short_stack.h and
-// packets.h are other ways to walk the same tree with the same hits; split_rules.h has simpler rules to split
-// by.
+// packets.h are other ways to walk the same tree with the same hits; split_rules.h has simpler rules.
 
 #include "chapters/01_ray_casting/ray_casting.h"
 
@@ -66,8 +65,9 @@ struct KdTreeView {
 // direction's largest axis z, which makes |d_k/d_z| ≤ 1 and the numbers the same for a direction of any
 // length. A plane is met at s = (split − o_k)/(d_k/d_z) with four roundings, and widened by slack·|d_z/d_k|
 // with one more: 5uD of slack. A component |d_k/d_z| < u is made u: that turns the ray by uD at most, and no
-// 0·∞ is left. t_min·|d_z| and t·|d_z| cost uD each. Together 25uD: the slack is 32uD, and a few of the
-// smallest normal numbers for what underflows.
+// 0·∞ is left. t_min·|d_z| and t·|d_z| cost uD each. Together 25uD: the slack is 32uD, a few of the smallest
+// normal numbers for what underflows, and |d_z| times what t loses to underflow. One vertex far away widens
+// all cells: rays then get slower, but not wrong.
 
 /// A ray as the walk sees it.
 template <class T>
@@ -78,8 +78,7 @@ struct KdRay {
   T speed;          ///< distance a unit of t
   T begin, end;     ///< the distances at which the ray is within the tree
 
-  /// Where the children of a node are met: the first until `first_end`, the second from `second_begin`. The
-  /// two overlap by the slack.
+  /// The children of a node: the ray is in the first until `first_end`, in the second from `second_begin`.
   struct Crossing {
     std::uint32_t first, second;
     T first_end, second_begin;
@@ -98,6 +97,7 @@ struct KdRay {
       reach = max(reach, max(std::fabs(lower[k] - ray.origin[k]), std::fabs(upper[k] - ray.origin[k])));
     constexpr T rounded = static_cast<T>(gamma<T>(32));
     slack = fma(rounded, reach, 4 * std::numeric_limits<T>::min());
+    slack = fma(speed, 2 * std::numeric_limits<T>::denorm_min(), slack);
     origin = ray.origin;
     if (!(reach < T(0x1p96f))) {  // what follows could overflow: every leaf is visited
       origin = Vec3<T>(0);
@@ -105,9 +105,8 @@ struct KdRay {
       slack = std::numeric_limits<T>::infinity();
     } else {
       for (int k = 0; k < 3; ++k) {
-        const T slope = d[k] / speed;
-        inverse[k] =
-            1 / (std::fabs(slope) >= unit_roundoff<T> ? slope : std::copysign(unit_roundoff<T>, d[k]));
+        const T slope = d[k] / speed, least = std::copysign(unit_roundoff<T>, slope);
+        inverse[k] = 1 / (std::fabs(slope) < std::fabs(least) ? least : slope);
       }
     }
     const Range range = within(tree.bounds, ray.t_min * speed, ray.t_max * speed);

@@ -45,20 +45,4 @@ inline KdSplit spatial_median_split(const Box& box, int axis) {
   return {0, middle, axis, true};
 }
 
-/// The median's plane across the longest axis that has one; none in a node that is small enough.
-inline KdSplit median_split(const Fragments& own, const Box& box, const KdTreeSettings& settings) {
-  if (own.count <= settings.leaf_size) return {};
-  const vec3 size = box.size();
-  int axes[3] = {0, 1, 2};
-  std::stable_sort(axes, axes + 3, [&](int a, int b) { return size[a] > size[b]; });
-  for (const int axis : axes) {
-    const KdSplit split =
-        settings.rule == SplitRule::spatial_median
-            ? spatial_median_split(box, axis)
-            : object_median_split(own.events[axis].data.get(), own.event_count[axis], own.count, box, axis);
-    if (split.axis >= 0) return split;
-  }
-  return {};
-}
-
 }  // namespace trilha
