@@ -63,9 +63,9 @@ struct KdTreeView {
 //
 // The walk's own rounding is paid for by the slack, too. Distances s = t·|d_z| are measured along the
 // direction's largest axis z, which makes |d_k/d_z| ≤ 1 and the numbers the same for a direction of any
-// length. A plane is met at s = (split − o_k)/(d_k/d_z) with four roundings, and widened by slack·|d_z/d_k|
-// with one more: 5uD of slack. A component |d_k/d_z| < u is made u: that turns the ray by uD at most, and no
-// 0·∞ is left. t_min·|d_z| and t·|d_z| cost uD each. Together 25uD: the slack is 32uD, a few of the smallest
+// length. A plane is met at s = (split − o_k)·(d_z/d_k) with three roundings, and widened by slack·|d_z/d_k|
+// with one more: 4uD of slack. A component |d_k/d_z| < u is made u: that turns the ray by uD at most, and no
+// 0·∞ is left. t_min·|d_z| and t·|d_z| cost uD each. Together 24uD: the slack is 32uD, a few of the smallest
 // normal numbers for what underflows, and |d_z| times what t loses to underflow. One vertex far away widens
 // all cells: rays then get slower, but not wrong.
 
@@ -95,21 +95,22 @@ struct KdRay {
     T reach = 0;
     for (int k = 0; k < 3; ++k)
       reach = max(reach, max(std::fabs(lower[k] - ray.origin[k]), std::fabs(upper[k] - ray.origin[k])));
-    constexpr T rounded = static_cast<T>(gamma<T>(32));
-    slack = fma(rounded, reach, 4 * std::numeric_limits<T>::min());
-    slack = fma(speed, 2 * std::numeric_limits<T>::denorm_min(), slack);
-    origin = ray.origin;
+    constexpr T rounded = static_cast<T>(gamma<T>(32)), least = unit_roundoff<T>;
+    constexpr T tiny =
+        4 * std::numeric_limits<T>::min();  // times u: two of the smallest subnormal, whose use is slow
+    slack = fma(rounded, reach, fma(least * speed, tiny, tiny));
+    begin = ray.t_min * speed;
+    end = ray.t_max * speed;
     if (!(reach < T(0x1p96f))) {  // what follows could overflow: every leaf is visited
       origin = Vec3<T>(0);
       inverse = Vec3<T>(1);
       slack = std::numeric_limits<T>::infinity();
-    } else {
-      for (int k = 0; k < 3; ++k) {
-        const T slope = d[k] / speed, least = std::copysign(unit_roundoff<T>, slope);
-        inverse[k] = 1 / (std::fabs(slope) < std::fabs(least) ? least : slope);
-      }
+      return begin <= end;
     }
-    const Range range = within(tree.bounds, ray.t_min * speed, ray.t_max * speed);
+    origin = ray.origin;
+    for (int k = 0; k < 3; ++k)
+      inverse[k] = size[k] > least * speed ? speed / d[k] : std::copysign(1 / least, d[k]);
+    const Range range = within(tree.bounds, begin, end);
     begin = range.begin;
     end = range.end;
     return begin <= end;
