@@ -17,7 +17,9 @@ namespace {
 
 using Exact = std::array<mpq_class, 3>;
 
-Exact exact(const vec3& p) { return {mpq_class(double(p.x)), mpq_class(double(p.y)), mpq_class(double(p.z))}; }
+Exact exact(const vec3& p) {
+  return {mpq_class(double(p.x)), mpq_class(double(p.y)), mpq_class(double(p.z))};
+}
 
 /// The triangle's part in a closed box, by exact arithmetic.
 std::vector<Exact> exactly_clipped(const vec3& a, const vec3& b, const vec3& c, const Box& box) {
@@ -58,7 +60,8 @@ std::vector<Leaf> leaves_of(const BuiltKdTree& tree, std::uint32_t primitives) {
   if (tree.nodes.size() == 0) return leaves;
   std::vector<int> seen(tree.nodes.size());
   std::vector<int> used(tree.references.size());
-  const std::function<void(std::uint32_t, const Box&, int)> down = [&](std::uint32_t i, const Box& box, int depth) {
+  const std::function<void(std::uint32_t, const Box&, int)> down = [&](std::uint32_t i, const Box& box,
+                                                                       int depth) {
     REQUIRE(i < tree.nodes.size());
     REQUIRE(++seen[i] == 1);
     REQUIRE(depth <= tree.depth_limit);
@@ -160,8 +163,10 @@ TEST_CASE("every point of a triangle lies in a leaf that holds it, in every scen
           for (const Leaf* leaf : near) {
             bool inside = true;
             for (int axis = 0; axis < 3; ++axis)
-              inside = inside && p[axis] >= double(leaf->box.lower[axis]) && p[axis] <= double(leaf->box.upper[axis]);
-            found = found || (inside && std::binary_search(leaf->primitives.begin(), leaf->primitives.end(), i));
+              inside = inside && p[axis] >= double(leaf->box.lower[axis]) &&
+                       p[axis] <= double(leaf->box.upper[axis]);
+            found =
+                found || (inside && std::binary_search(leaf->primitives.begin(), leaf->primitives.end(), i));
             if (found) break;
           }
           if (!found) FAIL_CHECK("triangle " << i << ": point " << k << " is in no leaf that holds it");
@@ -204,8 +209,8 @@ TEST_CASE("the tree is the same bit for bit, built by one thread or several") {
     });
 }
 
-// Catches: a plane left out, primitives counted on the wrong side, a flat one that is given to the dearer side,
-// ends and starts at the same place in the wrong order.
+// Catches: a plane left out, primitives counted on the wrong side, a flat one that is given to the dearer
+// side, ends and starts at the same place in the wrong order.
 TEST_CASE("the sweep finds the cost that trying every plane finds") {
   KdTreeSettings settings;
   for (std::uint64_t trial = 0; trial < 2000; ++trial) {
@@ -283,8 +288,8 @@ TEST_CASE("events sort as positions do, ends before flat ones before starts") {
   }
 }
 
-// Catches: bounds that leave out a point of the part, or are wider than promised; a part lost, a flat triangle
-// that gets a thickness.
+// Catches: bounds that leave out a point of the part, or are wider than promised; a part lost, a flat
+// triangle that gets a thickness.
 TEST_CASE("the bounds of a clipped triangle hold the exact part, and hardly more") {
   std::size_t empty = 0, tight = 0, clipped = 0;
   for (std::uint64_t trial = 0; trial < 6000; ++trial) {
@@ -320,12 +325,13 @@ TEST_CASE("the bounds of a clipped triangle hold the exact part, and hardly more
       REQUIRE(double(found.upper[k]) >= high);
       REQUIRE(found.lower[k] >= box.lower[k]);
       REQUIRE(found.upper[k] <= box.upper[k]);
-      // a plane that is moved out by the margin lets out more where the triangle is nearly parallel to it, but
-      // no more than lies beyond the exact plane; so only corners away from the box's sides are held to it
+      // a plane that is moved out by the margin lets out more where the triangle is nearly parallel to it,
+      // but no more than lies beyond the exact plane; so only corners away from the box's sides are held to
+      // it
       const double next_low = std::nextafter(rounded_down(low.get_d()), -INFINITY);
       const double next_high = std::nextafter(rounded_up(high.get_d()), INFINITY);
-      const bool is_tight = found.lower[k] >= next_low - 0x1p-44 * largest &&
-                            found.upper[k] <= next_high + 0x1p-44 * largest;
+      const bool is_tight =
+          found.lower[k] >= next_low - 0x1p-44 * largest && found.upper[k] <= next_high + 0x1p-44 * largest;
       tight += is_tight;
       if (a[k] == b[k] && b[k] == c[k]) REQUIRE(found.lower[k] == found.upper[k]);
     }
@@ -340,7 +346,8 @@ TEST_CASE("the surface-area heuristic costs less than the medians, and clipping 
   Mesh mesh = icosphere(4, 0.1, {3, 4, 2});  // something small and fine in a large hall
   for (const Mesh& hall : {cubes(1)})
     for (const uvec3& t : hall.triangles)
-      add_triangle(mesh, hall.positions[t.x] * 10.0f, hall.positions[t.y] * 10.0f, hall.positions[t.z] * 10.0f);
+      add_triangle(mesh, hall.positions[t.x] * 10.0f, hall.positions[t.y] * 10.0f,
+                   hall.positions[t.z] * 10.0f);
   for (const vec3 turn : {vec3(1), vec3(-1)})  // and a curtain across it
     add_triangle(mesh, vec3(5) - turn * 5.0f, vec3(5) + turn * vec3(5, 0, 5), vec3(5) + turn * vec3(5, 5, 4));
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
@@ -474,7 +481,8 @@ TEST_CASE("a build that is cancelled ends soon and leaves no memory") {
       for (;;) built_of(mesh, settings);
     }));
     other.join();
-    const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - asked).count();
+    const double ms =
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - asked).count();
     CHECK(ms < 1000);
     CHECK(live_bytes(Backend::cpu) == before);
   }

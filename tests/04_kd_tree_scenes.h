@@ -62,8 +62,8 @@ inline Mesh lattice_soup(std::uint32_t count, std::uint32_t steps, std::uint64_t
   return mesh;
 }
 
-/// A block of unit cubes, each with its twelve triangles: neighbours' faces lie in each other and in the planes
-/// that split them.
+/// A block of unit cubes, each with its twelve triangles: neighbours' faces lie in each other and in the
+/// planes that split them.
 inline Mesh cubes(int n) {
   Mesh mesh;
   for (int x = 0; x < n; ++x)
@@ -101,6 +101,8 @@ inline std::vector<NamedMesh> hard_scenes() {
   add("spiky sphere", spiky_sphere(15, 15, 1));
   add("size 1e-18", soup(500, 0.2f, 7, 1e-18f));
   add("size 1e18", soup(500, 0.2f, 8, 1e18f));
+  add("size 1e-40", soup(60, 0.2f, 16, 1e-40f));
+  add("size 1e30", soup(60, 0.2f, 17, 1e30f));
   add("1e5 sizes away", soup(500, 0.2f, 9, 1, {66319.0f, 551.0f, -74843.0f}));
   Mesh flat = soup(400, 0.2f, 10);
   for (vec3& p : flat.positions) p.y = 0.25f;
@@ -119,8 +121,9 @@ inline std::vector<NamedMesh> hard_scenes() {
   Mesh broken = soup(300, 0.3f, 14);
   Random random(14);
   for (int k = 0; k < 40; ++k)
-    broken.positions[random.index(900)][static_cast<int>(random.index(3))] =
-        k % 3 == 0 ? std::nanf("") : k % 3 == 1 ? INFINITY : -INFINITY;
+    broken.positions[random.index(900)][static_cast<int>(random.index(3))] = k % 3 == 0   ? std::nanf("")
+                                                                             : k % 3 == 1 ? INFINITY
+                                                                                          : -INFINITY;
   add("NaN and infinity", broken);
   Mesh nowhere = soup(9, 0.3f, 15);
   for (vec3& p : nowhere.positions) p.x = std::nanf("");

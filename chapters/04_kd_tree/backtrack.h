@@ -1,5 +1,6 @@
 #pragma once
 
+#include "chapters/04_kd_tree/build.h"
 #include "chapters/04_kd_tree/trail.h"
 
 namespace trilha {
@@ -19,8 +20,8 @@ struct KdLinks {
 /// Those of a tree in the CPU's memory, brought to the stream's backend.
 KdLinks make_links(const Stream& stream, const BuiltKdTree& tree);
 
-/// kd-backtrack (Foley & Sugerman 2005): after a leaf it climbs to the deepest node whose second child is still
-/// to be visited. Where the ray is in that child, its box says.
+/// kd-backtrack (Foley & Sugerman 2005): after a leaf it climbs to the deepest node whose second child is
+/// still to be visited. Where the ray is in that child, its box says.
 struct KdBacktrackWalk {
   KdLinksView links;
 

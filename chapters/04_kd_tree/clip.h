@@ -19,14 +19,18 @@ inline float rounded_up(double x) {
   return f < x ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
 }
 
+inline bool is_finite(const vec3& p) {
+  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
+
 inline Box intersection(const Box& a, const Box& b) {
   return {{max(a.lower.x, b.lower.x), max(a.lower.y, b.lower.y), max(a.lower.z, b.lower.z)},
           {min(a.upper.x, b.upper.x), min(a.upper.y, b.upper.y), min(a.upper.z, b.upper.z)}};
 }
 
-/// A box within `box` that holds all of the triangle's points that are in `box`, and hardly more: each side is
-/// off by 2⁻⁴⁵ of the largest coordinate and one float at most. Empty only if there are none. The triangle is
-/// finite.
+/// A box within `box` that holds all of the triangle's points that are in `box`, and hardly more: each side
+/// is off by 2⁻⁴⁵ of the largest coordinate and one float at most. Empty only if there are none. The triangle
+/// is finite.
 ///
 /// Each of six clips moves the polygon by 12u of the largest coordinate at most (u = 2⁻⁵³: three roundings in
 /// where an edge meets the plane, two in the product, one in the sum, on values of twice that size). So the
@@ -34,7 +38,8 @@ inline Box intersection(const Box& a, const Box& b) {
 /// own bounds needs no rounding: a triangle across an axis stays flat.
 inline Box clipped_bounds(const vec3& a, const vec3& b, const vec3& c, const Box& box) {
   const Box own = united(united(Box{a, a}, b), c);
-  dvec3 polygon[2][28] = {{a, b, c}, {}};  // nine corners, but half as many again a clip if rounding dents them
+  dvec3 polygon[2][28] = {{a, b, c},
+                          {}};  // nine corners, but half as many again a clip if rounding dents them
   int n = 3, from = 0;
   double largest = 0;
   for (int k = 0; k < 3; ++k)

@@ -1,8 +1,8 @@
 #pragma once
 // The kd-tree: space is halved by planes across the axes, again and again, where the surface-area heuristic
-// says that rays will save most. Read from top to bottom: the tree, what a ray needs to walk it, the walk with
-// a stack. kd_tree.cpp builds. restart.h, backtrack.h, push_down.h, short_stack.h and packets.h are other ways
-// to walk the same tree with the same hits; split_rules.h has simpler rules to split by.
+// says that rays will save most. Read from top to bottom: the tree, what a ray needs to walk it, the walk
+// with a stack; then kd_tree.cpp, which builds. restart.h, backtrack.h, push_down.h, short_stack.h and
+// packets.h are other ways to walk the same tree with the same hits; split_rules.h has simpler rules.
 
 #include "chapters/01_ray_casting/ray_casting.h"
 
@@ -51,11 +51,11 @@ struct KdTreeView {
 
 // ---- a ray in the tree -------------------------------------------------------
 
-// What keeps the hits those of brute force. Brute force computes a t that has an error, and a ray may even hit
-// by rounding what it misses by a hair; a walk along the exact ray would not find it. But the watertight test
-// errs backwards: with weights w that are the exact ones of vertices moved by 5uD at most (two roundings for
-// v − o, one for the shear, two in the fused product; u the unit roundoff, D the largest coordinate of any
-// v − o), t·d_z is that of the weights' mean up to 12uD (7u a weight, 4u in the mean, u in v − o). So the
+// What keeps the hits those of brute force. Brute force computes a t that has an error, and a ray may even
+// hit by rounding what it misses by a hair; a walk along the exact ray would not find it. But the watertight
+// test errs backwards: with weights w that are the exact ones of vertices moved by 5uD at most (two roundings
+// for v − o, one for the shear, two in the fused product; u the unit roundoff, D the largest coordinate of
+// any v − o), t·d_z is that of the weights' mean up to 12uD (7u a weight, 4u in the mean, u in v − o). So the
 // point that brute force reports, at its computed t, is no further than 17uD in any coordinate from a point P
 // of the triangle, and the leaf of P refers to the triangle. Therefore: widen every cell by a slack of more
 // than 17uD, visit every leaf whose widened cell the ray meets between t_min and the nearest hit so far, and
@@ -63,10 +63,11 @@ struct KdTreeView {
 //
 // The walk's own rounding is paid for by the slack, too. Distances s = t·|d_z| are measured along the
 // direction's largest axis z, which makes |d_k/d_z| ≤ 1 and the numbers the same for a direction of any
-// length. A plane is met at s = (split − o_k)/(d_k/d_z) with four roundings, and widened by slack·|d_z/d_k|
-// with one more: 5uD of slack. A component |d_k/d_z| < u is made u: that turns the ray by uD at most, and no
-// 0·∞ is left. t_min·|d_z| and t·|d_z| cost uD each. Together 25uD: the slack is 32uD, and a few of the
-// smallest normal numbers for what underflows.
+// length. A plane is met at s = (split − o_k)·(d_z/d_k) with three roundings, and widened by slack·|d_z/d_k|
+// with one more: 4uD of slack. A component |d_k/d_z| < u is made u: that turns the ray by uD at most, and no
+// 0·∞ is left. t_min·|d_z| and t·|d_z| cost uD each. Together 24uD: the slack is 32uD, a few of the smallest
+// normal numbers for what underflows, and |d_z| times what t loses to underflow. One vertex far away widens
+// all cells: rays then get slower, but not wrong.
 
 /// A ray as the walk sees it.
 template <class T>
@@ -77,8 +78,7 @@ struct KdRay {
   T speed;          ///< distance a unit of t
   T begin, end;     ///< the distances at which the ray is within the tree
 
-  /// Where the children of a node are met: the first until `first_end`, the second from `second_begin`. The
-  /// two overlap by the slack.
+  /// The children of a node: the ray is in the first until `first_end`, in the second from `second_begin`.
   struct Crossing {
     std::uint32_t first, second;
     T first_end, second_begin;
@@ -95,20 +95,22 @@ struct KdRay {
     T reach = 0;
     for (int k = 0; k < 3; ++k)
       reach = max(reach, max(std::fabs(lower[k] - ray.origin[k]), std::fabs(upper[k] - ray.origin[k])));
-    constexpr T rounded = static_cast<T>(gamma<T>(32));
-    slack = fma(rounded, reach, 4 * std::numeric_limits<T>::min());
-    origin = ray.origin;
+    constexpr T rounded = static_cast<T>(gamma<T>(32)), least = unit_roundoff<T>;
+    constexpr T tiny =
+        4 * std::numeric_limits<T>::min();  // times u: two of the smallest subnormal, whose use is slow
+    slack = fma(rounded, reach, fma(least * speed, tiny, tiny));
+    begin = ray.t_min * speed;
+    end = ray.t_max * speed;
     if (!(reach < T(0x1p96f))) {  // what follows could overflow: every leaf is visited
       origin = Vec3<T>(0);
       inverse = Vec3<T>(1);
       slack = std::numeric_limits<T>::infinity();
-    } else {
-      for (int k = 0; k < 3; ++k) {
-        const T slope = d[k] / speed;
-        inverse[k] = 1 / (std::fabs(slope) >= unit_roundoff<T> ? slope : std::copysign(unit_roundoff<T>, d[k]));
-      }
+      return begin <= end;
     }
-    const Range range = within(tree.bounds, ray.t_min * speed, ray.t_max * speed);
+    origin = ray.origin;
+    for (int k = 0; k < 3; ++k)
+      inverse[k] = size[k] > least * speed ? speed / d[k] : std::copysign(1 / least, d[k]);
+    const Range range = within(tree.bounds, begin, end);
     begin = range.begin;
     end = range.end;
     return begin <= end;
@@ -236,61 +238,5 @@ struct KdTree {
     return hit;
   }
 };
-
-// ---- the builder -------------------------------------------------------------
-
-/// Where a node is split: where the surface-area heuristic promises most; in the middle of its primitives;
-/// in the middle of its box. The medians take the longest axis.
-enum class SplitRule { surface_area, object_median, spatial_median };
-constexpr SplitRule all_split_rules[] = {SplitRule::surface_area, SplitRule::object_median,
-                                         SplitRule::spatial_median};
-/// Its name as the settings have it.
-inline const char* name(SplitRule rule) {
-  constexpr const char* names[] = {"surface-area", "object-median", "spatial-median"};
-  return names[static_cast<int>(rule)];
-}
-
-struct KdTreeSettings {
-  SplitRule rule = SplitRule::surface_area;
-  double traversal_cost = 15, intersection_cost = 20;  ///< of one node and one primitive; any unit
-  double empty_bonus = 0.2;         ///< a split that cuts off empty space counts as that much cheaper
-  std::uint32_t leaf_size = 4;      ///< medians split no further
-  double depth_base = 8;            ///< the depth is at most depth_base + depth_factor·log₂(primitives),
-  double depth_factor = 1.3;        ///< and kd_most_depth
-  double most_references = 32;      ///< a primitive, on the mean
-  bool clip = true;                 ///< split clipping: what counts is the part of a primitive in the cell
-  bool parallel = true;             ///< on all threads; the tree is the same
-};
-
-/// Milliseconds of each phase.
-struct KdBuildTimes {
-  double events = 0;  ///< finding where primitives begin and end
-  double sort = 0;
-  double split = 0;     ///< the tree itself
-  double assemble = 0;  ///< copying it into its buffers
-};
-
-/// A tree and what was found out while it was built.
-struct BuiltKdTree {
-  Box bounds;
-  Buffer<KdNode> nodes;
-  Buffer<std::uint32_t> references;
-  int depth_limit = 0;
-  std::uint64_t leaves_by_depth = 0;       ///< that the limit of depth ended, not the rule
-  std::uint64_t leaves_by_references = 0;  ///< that the limit of references ended
-  std::uint32_t not_finite = 0;            ///< primitives with NaN or infinity, which nothing can hit: left out
-  KdBuildTimes times;
-
-  KdTreeView view() const { return {bounds, nodes.data(), references.data()}; }
-  std::size_t bytes() const { return nodes.bytes() + references.bytes(); }
-  /// The same tree on another backend (or this one).
-  BuiltKdTree to(Backend backend, const Stream& stream) const;
-};
-
-/// Builds the tree of `count` triangles on the CPU, where the arrays and the tree lie. Wald & Havran 2006: an
-/// exact sweep over all planes at which the cost can have its minimum, in O(N log N). Throws InputError for
-/// more than 2³⁰ − 1 triangles or settings that are out of range, Cancelled in work that was cancelled.
-BuiltKdTree build_kd_tree(const vec3* positions, const uvec3* triangles, std::uint32_t count,
-                          const KdTreeSettings& settings = {});
 
 }  // namespace trilha

@@ -149,8 +149,8 @@ class Traced {
           own.shear_y = sheared_.shear_y[lane];
           own.origin = {sheared_.origin[0][lane], sheared_.origin[1][lane], sheared_.origin[2][lane]};
           const bool in = ranges.begin[lane] <= min(ranges.end[lane], p_.nearest[lane]);
-          const bool pass = Test::may_hit(
-              Test::measure_turned(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], own));
+          const bool pass =
+              Test::may_hit(Test::measure_turned(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], own));
           passed[lane] = pass & in ? 1 : 0;
           some |= passed[lane];
         }
@@ -207,8 +207,8 @@ struct TracePacket {
 template <Query query, class Test>
 void trace_kd_packets(const KdTreeView& tree, const Triangles<Test, float>& triangles, const Ray* rays,
                       QueryAnswer<query, float>* answers, std::size_t n) {
-  for_each(Backend::cpu, (n + lanes - 1) / lanes,
-           TracePacket<query, Test>{tree, triangles, rays, answers, n}, 16);
+  for_each(Backend::cpu, (n + lanes - 1) / lanes, TracePacket<query, Test>{tree, triangles, rays, answers, n},
+           16);
 }
 
 template void trace_kd_packets<Query::closest>(const KdTreeView&, const Triangles<Watertight, float>&,

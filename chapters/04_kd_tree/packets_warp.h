@@ -1,7 +1,7 @@
 #pragma once
 // Packets on the device: the rays of a warp go through the tree together, with one stack of nodes in shared
-// memory. Each thread keeps where its own ray is; they vote on the way. All threads read the same node and the
-// same triangle at the same time. Only for nvcc.
+// memory. Each thread keeps where its own ray is; they vote on the way. All threads read the same node and
+// the same triangle at the same time. Only for nvcc.
 
 #include "chapters/04_kd_tree/packets.h"
 #include "cuda/check.h"
@@ -35,7 +35,8 @@ __global__ void __launch_bounds__(kd_warp_threads)
   unsigned upwards = 0;
   const unsigned asking = __ballot_sync(everyone, walk.begin <= walk.end);
   for (int k = 0; k < 3; ++k)
-    upwards |= 2 * __popc(__ballot_sync(everyone, walk.inverse[k] > 0) & asking) >= __popc(asking) ? 1u << k : 0u;
+    upwards |=
+        2 * __popc(__ballot_sync(everyone, walk.inverse[k] > 0) & asking) >= __popc(asking) ? 1u << k : 0u;
 
   float begin = walk.begin, end = walk.end, nearest = walk.end;
   int height = 0;
@@ -90,8 +91,8 @@ __global__ void __launch_bounds__(kd_warp_threads)
 
 /// The answers of n rays; all arrays lie on the device.
 template <Query query, class Primitives>
-void trace_kd_warps(const Stream& stream, const KdTreeView& tree, const Primitives& primitives, const Ray* rays,
-                    QueryAnswer<query, float>* answers, std::size_t n) {
+void trace_kd_warps(const Stream& stream, const KdTreeView& tree, const Primitives& primitives,
+                    const Ray* rays, QueryAnswer<query, float>* answers, std::size_t n) {
   constexpr std::size_t most = std::size_t{kd_warp_threads} << 30;
   for (std::size_t first = 0; first < n; first += most) {
     const std::size_t count = n - first < most ? n - first : most;

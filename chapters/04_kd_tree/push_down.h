@@ -4,8 +4,8 @@
 
 namespace trilha {
 
-/// Push-down (Horn et al. 2007): kd-restart that begins not at the root, but at the deepest node that holds all
-/// that is still to be visited. A ray that is short, or near its end, does not climb far.
+/// Push-down (Horn et al. 2007): kd-restart that begins not at the root, but at the deepest node that holds
+/// all that is still to be visited. A ray that is short, or near its end, does not climb far.
 struct KdPushDownWalk {
   template <bool any, class Primitives, class T, class ProbeType>
   TRILHA_HD void operator()(const KdTreeView& tree, const Primitives& primitives, const RayOf<T>& ray,

@@ -4,8 +4,8 @@
 
 namespace trilha {
 
-/// Short stack (Horn et al. 2007): a stack of few places, which forgets the oldest entry when it is full, and a
-/// restart when it has run empty before all is visited. Most rays never restart.
+/// Short stack (Horn et al. 2007): a stack of few places, which forgets the oldest entry when it is full, and
+/// a restart when it has run empty before all is visited. Most rays never restart.
 struct KdShortStackWalk {
   static constexpr int most_places = 16;
   int places = 4;  ///< 1 to most_places
@@ -18,7 +18,8 @@ struct KdShortStackWalk {
     const auto constants = primitives.constants(ray);
     T nearest = hit.t * walk.speed;
     KdTrail trail;
-    KdPart<T> stack[most_places];  // a ring, and its newest entry is that of the deepest level that is pending
+    KdPart<T>
+        stack[most_places];  // a ring, and its newest entry is that of the deepest level that is pending
     int newest = 0, height = 0;
     KdPart<T> part{0, walk.begin, walk.end}, later;
     std::uint64_t level = KdTrail::root;

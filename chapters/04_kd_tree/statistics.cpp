@@ -41,7 +41,8 @@ void for_each_node(const BuiltKdTree& tree, const Visit& visit) {
 
 }  // namespace
 
-KdTreeStatistics statistics(const BuiltKdTree& tree, std::uint32_t primitives, const KdTreeSettings& settings) {
+KdTreeStatistics statistics(const BuiltKdTree& tree, std::uint32_t primitives,
+                            const KdTreeSettings& settings) {
   KdTreeStatistics s;
   const double whole = half_area(tree.bounds);
   double depths = 0;
@@ -77,7 +78,8 @@ std::vector<KdPlane> planes(const BuiltKdTree& tree, int first, int last, std::s
     plane.rectangle.lower[node.axis()] = plane.rectangle.upper[node.axis()] = node.split;
     found.push_back(plane);
   });
-  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.depth < b.depth; });
+  std::stable_sort(found.begin(), found.end(),
+                   [](const auto& a, const auto& b) { return a.depth < b.depth; });
   if (found.size() > most) {
     left_out = found.size() - most;
     found.resize(most);

@@ -36,7 +36,8 @@ template <Query query>
 void answer(const Stream& stream, const KdTraced& traced, const Primitives& triangles, const Ray* rays,
             QueryAnswer<query, float>* answers, std::size_t n) {
   if (traced.traversal == KdTraversal::packets && traced.tree.nodes != nullptr) {
-    if (stream.backend() == Backend::cpu) return trace_kd_packets<query>(traced.tree, triangles, rays, answers, n);
+    if (stream.backend() == Backend::cpu)
+      return trace_kd_packets<query>(traced.tree, triangles, rays, answers, n);
 #if defined(__CUDACC__)
     return trace_kd_warps<query>(stream, traced.tree, triangles, rays, answers, n);
 #endif

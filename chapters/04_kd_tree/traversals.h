@@ -10,8 +10,8 @@
 namespace trilha {
 
 enum class KdTraversal { stack, restart, backtrack, push_down, short_stack, packets };
-constexpr KdTraversal all_kd_traversals[] = {KdTraversal::stack,     KdTraversal::restart,
-                                             KdTraversal::backtrack, KdTraversal::push_down,
+constexpr KdTraversal all_kd_traversals[] = {KdTraversal::stack,       KdTraversal::restart,
+                                             KdTraversal::backtrack,   KdTraversal::push_down,
                                              KdTraversal::short_stack, KdTraversal::packets};
 /// Its name as the settings have it.
 inline const char* name(KdTraversal traversal) {
@@ -27,8 +27,8 @@ struct KdTraced {
   KdLinksView links{};  ///< for backtracking alone
 };
 
-/// Calls function(structure) with the tree over the primitives as it is walked; packets have none of their own
-/// for one ray, and give that of the stack.
+/// Calls function(structure) with the tree over the primitives as it is walked; packets have none of their
+/// own for one ray, and give that of the stack.
 template <class Primitives, class Function>
 decltype(auto) with_kd_walk(const KdTraced& traced, const Primitives& primitives, const Function& function) {
   switch (traced.traversal) {
@@ -45,7 +45,8 @@ decltype(auto) with_kd_walk(const KdTraced& traced, const Primitives& primitives
   }
 }
 
-/// The nearest hit of each of n rays; all arrays lie on the stream's backend. All traversals give the same hits.
+/// The nearest hit of each of n rays; all arrays lie on the stream's backend. All traversals give the same
+/// hits.
 void trace_kd_tree(const Stream& stream, const KdTraced& traced, const Triangles<Watertight>& triangles,
                    const Ray* rays, Hit* hits, std::size_t n);
 
