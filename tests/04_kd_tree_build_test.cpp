@@ -202,6 +202,11 @@ TEST_CASE("the tree is the same bit for bit, built by one thread or several") {
       settings.parallel = false;
       const BuiltKdTree serial = built_of(mesh, settings);
       CHECK(parallel.nodes.size() > 200);
+      const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
+      std::set<std::uint32_t> held;
+      for (const Leaf& leaf : leaves_of(parallel, count))
+        held.insert(leaf.primitives.begin(), leaf.primitives.end());
+      CHECK(held.size() == count);
       CHECK(same(parallel, serial));
       CHECK(same(parallel, again));
       CHECK(parallel.leaves_by_references == serial.leaves_by_references);
