@@ -74,17 +74,17 @@ void measure_arena(Report& report) {
       const bool device = backend == Backend::cuda;
       Scene scene = load_scene("torus_knot");
       const Box box = bounds(scene);
-      const vec3 extent = box.size();
-      const float half = std::max({extent.x, extent.y, extent.z}) / 2 * static_cast<float>(size);
-      const vec3 c = box.centre();
+      const vec3 extent = box.size(), c = box.centre(), eye = scene.camera.eye;
+      const float model = std::max({extent.x, extent.y, extent.z});
+      const float half = model / 2 * static_cast<float>(size);
+      // a floor and a ceiling that hide nothing of the model
+      const float low = std::min(box.lower.y, eye.y) - model / 8, high = std::max(box.upper.y, eye.y) + half;
       Mesh floor;
-      floor.positions = {{c.x - half, box.lower.y, c.z - half},
-                         {c.x + half, box.lower.y, c.z - half},
-                         {c.x + half, box.lower.y, c.z + half},
-                         {c.x - half, box.lower.y, c.z + half},
-                         {c.x, box.lower.y + 2 * half, c.z}};
-      floor.triangles = {{0, 2, 1}, {0, 3, 2}, {0, 1, 4}};
-      floor.materials.assign(3, 0);
+      for (const float y : {low, high})
+        for (const vec2& at : {vec2(-1, -1), vec2(1, -1), vec2(1, 1), vec2(-1, 1)})
+          floor.positions.push_back({c.x + at.x * half, y, c.z + at.y * half});
+      floor.triangles = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}};
+      floor.materials.assign(4, 0);
       if (scene.materials.empty()) scene.materials.push_back({});
       scene.meshes.push_back(std::move(floor));
       if (!scene.instances.empty()) {
@@ -151,7 +151,7 @@ std::vector<Experiment> kd_tree_experiments() {
   Experiment arena{"arena",
                    1,
                    {plot_of("arena", "A model in an arena: grid against kd-tree",
-                            "three triangles make the arena so many times larger than the model",
+                            "a floor and a ceiling make the arena so many times larger than the model",
                             {"settings.arena", "size of the arena / size of the model"},
                             {"time_ms", "time of the rays (ms)"}, true)},
                    measure_arena};
