@@ -11,7 +11,7 @@ namespace trilha {
 /// is that has triangles. 0 for a cell that has some; farthest_jump stands for all that is as far or further.
 constexpr int farthest_jump = 255;
 
-/// Three passes, an axis each. Throws Cancelled.
+/// Of one pass an axis. Throws Cancelled.
 Buffer<std::uint8_t> empty_distances(const Stream& stream, const GridView& grid);
 
 /// Along one axis, to the cell just out of the cube, if the ray leaves it `here`, or else to the cell at t,

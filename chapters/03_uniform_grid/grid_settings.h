@@ -21,7 +21,7 @@ struct ResolutionSettings {
   ResolutionRule rule = ResolutionRule::density;
   ivec3 by_hand{32};
   float factor = 2;
-  float density = 5;
+  float density = 3;
 };
 
 /// Why a grid has fewer cells than were asked for.
