@@ -79,10 +79,18 @@ WhittedRenderer::WhittedRenderer(const Scene& scene, const WhittedSettings& sett
   else
     rt_gpu_ = std::make_unique<RtGpu>(scene_, settings.kernel, settings.block_width, settings.block_height,
                                       stream_);
+  set(settings);
   stream_.synchronize();
 }
 
 WhittedRenderer::~WhittedRenderer() = default;
+
+void WhittedRenderer::set(const WhittedSettings& settings) {
+  const Media eye = settings_.terms.eye;
+  settings_ = settings;
+  settings_.terms.eye = eye;
+  if (tracer_ != nullptr) tracer_->set_surely_ahead(surely_ahead(settings_.terms));
+}
 
 // ---- rendering ---------------------------------------------------------------
 
@@ -90,7 +98,6 @@ void WhittedRenderer::colours(const Ray* rays, vec4* colours, std::size_t n) {
   if (n == 0) return;
   Timer timer(stream_);
   if (settings_.kernel == Kernel::split) {
-    tracer_->set_surely_ahead(surely_ahead(settings_.terms));
     split_.colours(scene_.view(), *tracer_, settings_.terms, features_, settings_.shadow_cache, rays, colours,
                    n);
   } else if (settings_.kernel == Kernel::fused) {

@@ -38,11 +38,7 @@ class WhittedRenderer {
   Hit trace(const Ray& ray) const;
 
   /// Settings that need no rebuild: the terms' numbers and the pattern.
-  void set(const WhittedSettings& settings) {
-    const Media eye = settings_.terms.eye;
-    settings_ = settings;
-    settings_.terms.eye = eye;
-  }
+  void set(const WhittedSettings& settings);
   /// What the terms say of a camera: the width of its pixels, and what glass its eye is in.
   Terms terms_of(const Camera& camera, std::uint32_t height);
 

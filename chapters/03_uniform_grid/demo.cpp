@@ -160,6 +160,7 @@ class UniformGridDemo final : public WhittedDemo {
     if (structure_ == Structure::brute_force) return {};
     UniformGridSettings settings = grid_settings_;
     settings.grid.most_bytes = static_cast<std::size_t>(most_megabytes_) << 20;
+    settings.keep_distances = settings.keep_distances || !settings_.specialise;
     return [settings, &kept](const Stream& stream, const TriangleArrays& triangles) {
       auto made = std::make_unique<GridStructure>(stream, triangles, settings);
       if (kept == nullptr) kept = made.get();  // the first is that of all triangles

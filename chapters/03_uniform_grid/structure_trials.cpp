@@ -89,25 +89,26 @@ TrialScene::TrialScene(const Scene& scene, const Stream& stream, const MakeStruc
 
 // ---- answers -----------------------------------------------------------------
 
-Mismatches mismatches(const Stream& stream, const TriangleArrays& triangles,
-                      const TriangleStructure& structure, const Buffer<Ray>& rays, std::size_t most) {
-  const std::vector<Ray> asked = chosen(rays.to_vector(stream), most);
-  const std::size_t n = asked.size();
-  const Buffer<Ray> there(stream, asked);
-  Buffer<Hit> hits(stream.backend(), n);
-  Buffer<std::uint8_t> any(stream.backend(), n);
-  const auto judge = brute_force(TriangleTest::watertight)(stream, triangles);
-  judge->closest(there.data(), hits.data(), n);
-  const std::vector<Hit> expected = hits.to_vector(stream);
-  structure.closest(there.data(), hits.data(), n);
-  structure.occluded(there.data(), any.data(), n);
-  const std::vector<Hit> found = hits.to_vector(stream);
-  const std::vector<std::uint8_t> occluded = any.to_vector(stream);
+Judge::Judge(const Stream& stream, const TriangleArrays& triangles, const Buffer<Ray>& rays, std::size_t most)
+    : stream_(stream), rays_(stream, chosen(rays.to_vector(stream), most)) {
+  Buffer<Hit> hits(stream.backend(), rays_.size());
+  brute_force(TriangleTest::watertight)(stream, triangles)->closest(rays_.data(), hits.data(), rays_.size());
+  expected_ = hits.to_vector(stream);
+}
+
+Mismatches Judge::mismatches(const TriangleStructure& structure) const {
+  const std::size_t n = rays_.size();
+  Buffer<Hit> hits(stream_.backend(), n);
+  Buffer<std::uint8_t> any(stream_.backend(), n);
+  structure.closest(rays_.data(), hits.data(), n);
+  structure.occluded(rays_.data(), any.data(), n);
+  const std::vector<Hit> found = hits.to_vector(stream_);
+  const std::vector<std::uint8_t> occluded = any.to_vector(stream_);
   Mismatches wrong;
   wrong.of = n;
   for (std::size_t i = 0; i < n; ++i) {
-    wrong.closest += same(found[i], expected[i]) ? 0 : 1;
-    wrong.occluded += (occluded[i] != 0) == expected[i].found() ? 0 : 1;
+    wrong.closest += same(found[i], expected_[i]) ? 0 : 1;
+    wrong.occluded += (occluded[i] != 0) == expected_[i].found() ? 0 : 1;
   }
   return wrong;
 }
@@ -149,6 +150,10 @@ void try_contenders(Report& report, const TrialScene& scene, const std::vector<C
     const Buffer<Ray>& rays = scene.rays(kind);
     const std::size_t n = rays.size();
     if (n == 0) continue;
+    if (!report.keep_going()) {
+      report.leave_out(scene.name() + ", " + name(backend) + ", " + name(kind) + " rays");
+      continue;
+    }
     Buffer<Hit> hits(backend, kind == RayKind::shadow ? 1 : n);
     Buffer<std::uint8_t> any(backend, kind == RayKind::shadow ? n : 1);
     Buffer<Probe> probes(backend, n);
@@ -164,6 +169,7 @@ void try_contenders(Report& report, const TrialScene& scene, const std::vector<C
     const double budget = device ? 1e11 : 1e9;
     const auto most =
         static_cast<std::size_t>(std::clamp(budget / std::max(triangles.count, 1u), 100.0, 1e6));
+    const Judge judge(stream, triangles, rays, most);
     for (std::size_t k = 0; k < entries.size(); ++k) {
       const TriangleStructure& structure = *entries[k].structure;
       Row row;
@@ -175,7 +181,7 @@ void try_contenders(Report& report, const TrialScene& scene, const std::vector<C
       row.settings["triangles"] = double(triangles.count);
       if (!device) row.settings["threads"] = double(thread_count());
       row.time_ms = times[k];
-      const Mismatches wrong = mismatches(stream, triangles, structure, rays, most);
+      const Mismatches wrong = judge.mismatches(structure);
       row.errors = {{"mismatches", double(wrong.closest + wrong.occluded)}, {"compared", double(wrong.of)}};
       row.build_ms = entries[k].build_ms;
       row.bytes = entries[k].bytes;
@@ -256,9 +262,10 @@ std::vector<StabilityCase> structure_cases(const std::vector<Contender>& contend
                          const Buffer rays(stream, trial.rays);
                          const TriangleArrays arrays{positions.data(), triangles.data(),
                                                      static_cast<std::uint32_t>(triangles.size())};
+                         const Judge judge(stream, arrays, rays, rays.size());
                          for (const Contender& one : contenders) {
                            const auto structure = one.make(stream, arrays);
-                           const Mismatches wrong = mismatches(stream, arrays, *structure, rays, rays.size());
+                           const Mismatches wrong = judge.mismatches(*structure);
                            StabilityRow row;
                            row.technique = one.technique;
                            row.backend = backend;

@@ -55,9 +55,18 @@ class TrialScene {
 struct Mismatches {
   std::uint64_t closest = 0, occluded = 0, of = 0;  ///< of: rays that were asked both
 };
-/// Asks `most` of the rays at most, evenly chosen.
-Mismatches mismatches(const Stream& stream, const TriangleArrays& triangles,
-                      const TriangleStructure& structure, const Buffer<Ray>& rays, std::size_t most);
+/// What brute force answers, by which structures of the same triangles are judged.
+class Judge {
+ public:
+  /// Asks `most` of the rays at most, evenly chosen.
+  Judge(const Stream& stream, const TriangleArrays& triangles, const Buffer<Ray>& rays, std::size_t most);
+  Mismatches mismatches(const TriangleStructure& structure) const;
+
+ private:
+  Stream stream_;
+  Buffer<Ray> rays_;
+  std::vector<Hit> expected_;
+};
 
 /// Builds the contenders (the median of up to five builds), lets them take turns at the rays of each kind,
 /// and adds a row for each: time, cells or nodes and triangles a ray, mismatches with brute force among as

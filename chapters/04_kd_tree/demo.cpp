@@ -116,16 +116,17 @@ class KdTreeDemo final : public WhittedDemo {
   std::vector<Line> overlay(int level) const override {
     std::vector<Line> lines;
     if (overlay_levels() == 0) return lines;
-    constexpr std::size_t most = 4000;
+    constexpr std::size_t most = std::size_t{1} << 20, drawn = 4000;  // every so manieth, if there are more
     std::uint64_t left_out = 0;
-    for (const KdPlane& plane :
-         planes(tree_->tree().to(Backend::cpu, tree_->stream()), level, level, most, left_out)) {
-      const int u = (plane.axis + 1) % 3, v = (plane.axis + 2) % 3;
+    const std::vector<KdPlane> all =
+        planes(tree_->tree().to(Backend::cpu, tree_->stream()), level, level, most, left_out);
+    for (std::size_t i = 0; i < all.size(); i += (all.size() + drawn - 1) / drawn) {
+      const KdPlane& plane = all[i];
+      const int u = (plane.axis + 1) % 3;
       vec3 corners[4] = {plane.rectangle.lower, plane.rectangle.lower, plane.rectangle.upper,
                          plane.rectangle.upper};
       corners[1][u] = plane.rectangle.upper[u];
       corners[3][u] = plane.rectangle.lower[u];
-      static_cast<void>(v);
       for (int k = 0; k < 4; ++k) lines.push_back({corners[k], corners[(k + 1) % 4], Line::Ink::structure});
     }
     return lines;
@@ -164,6 +165,7 @@ class KdTreeDemo final : public WhittedDemo {
     if (structure_ == Structure::brute_force) return {};
     if (structure_ == Structure::grid) return uniform_grid({});
     KdSettings settings = kd_;
+    settings.keep_links = settings.keep_links || !settings_.specialise;
     settings.tree.traversal_cost = traversal_cost_;
     settings.tree.intersection_cost = intersection_cost_;
     settings.tree.empty_bonus = empty_bonus_;
