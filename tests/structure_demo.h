@@ -53,7 +53,9 @@ struct StructureSubject {
   std::vector<vec3> sample(const Scene& scene, const Stream& stream = Backend::cpu, int width = demo_width,
                            int height = demo_height) {
     Film film(stream, width, height);
-    REQUIRE(demo->add_sample(film, {scene.camera, 0, false, 3, 1000, [](double) { return true; }}));
+    const bool whole =  // on its own: Cancelled is no failure
+        demo->add_sample(film, {scene.camera, 0, false, 3, 1000, [](double) { return true; }});
+    REQUIRE(whole);
     return film.image(stream).pixels;
   }
   std::vector<vec3> picture(const Scene& scene, const Stream& stream = Backend::cpu) {
@@ -129,6 +131,15 @@ inline void check_structure_settings(MakeDemo make, const std::vector<SettingTri
         }
     }
   }
+}
+
+/// Of the scene's triangles as they stand in the world.
+inline Box triangle_bounds(const Scene& scene) {
+  const Mesh mesh = flattened(scene, MeshParts{});
+  Box box;
+  for (const uvec3& t : mesh.triangles)
+    for (const std::uint32_t corner : {t.x, t.y, t.z}) box = united(box, mesh.positions[corner]);
+  return box;
 }
 
 /// Rays through the centres of a picture's pixels, as the demo sends them without antialiasing.
