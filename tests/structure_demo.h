@@ -507,7 +507,10 @@ inline void check_experiments(const std::vector<Experiment>& experiments, const 
     CHECK(std::isfinite(row.errors[0].value.value));
     CHECK(row.build_ms.has_value());
     CHECK(row.bytes.value_or(0) > 0);
-    if (row.experiment != "samples") CHECK(value(row, "mismatches") == 0);
+    if (row.experiment == "versions")  // pixels, by two triangle tests
+      CHECK(value(row, "mismatches") <= 4);
+    else if (row.experiment != "samples")
+      CHECK(value(row, "mismatches") == 0);
   }
 }
 

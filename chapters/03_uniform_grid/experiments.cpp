@@ -108,6 +108,7 @@ void measure_versions(Report& report) {
       const Buffer<Ray>& rays = trial.rays(RayKind::primary);
       std::vector<std::unique_ptr<WhittedScene>> scenes;
       std::vector<std::unique_ptr<RtGrid>> grids;
+      std::vector<double> build_ms, bytes;
       Buffer<vec4> colours(backend, rays.size());
       std::vector<std::function<void()>> work;
       WhittedSettings settings;
@@ -117,8 +118,12 @@ void measure_versions(Report& report) {
         GridSettings grid;
         grid.resolution.rule = ResolutionRule::by_hand;
         grid.resolution.by_hand = ivec3(one.cells);
+        const auto before = static_cast<double>(live_bytes(backend));
+        Timer timer(stream);
         grids.push_back(std::make_unique<RtGrid>(*scenes.back(), version, settings.block_width,
                                                  settings.block_height, grid, stream));
+        build_ms.push_back(timer.milliseconds());
+        bytes.push_back(static_cast<double>(live_bytes(backend)) - before);
         work.push_back([&, rt = grids.back().get()] {
           rt->colours(settings.terms, rays.data(), colours.data(), rays.size());
         });
@@ -147,6 +152,8 @@ void measure_versions(Report& report) {
         row.time_ms = times[k];
         row.errors = {{"mismatches", wrong}};  // pixels that are further than 1/255 from RT-GPU's
         row.rays = rays_in_all;
+        row.build_ms = build_ms[k];
+        row.bytes = bytes[k];
         if (one.frames_per_s[k] > 0)
           row.published =
               Published{1000 / one.frames_per_s[k] * width * height / (640.0 * 480.0),
