@@ -8,6 +8,7 @@
 
 #include "chapters/02_whitted/optics.h"
 #include "common/scene/extreme.h"
+#include "common/scene/made/solids.h"
 #include "tests/whitted.h"
 
 using namespace trilha;
@@ -620,7 +621,7 @@ TEST_CASE("02: a ball of glass in water in glass, by Bouguer's law") {
           const double half = std::sqrt(radii[k] * radii[k] - passes * passes);
           const double next = k < 2 ? radii[k + 1] : 0;
           sure = sure && std::fabs(passes - next) > 1e-2 && half > 0.1;
-          if (passes >= next) {
+          if (k == 2 || passes >= next) {
             lengths[k] = 2 * half;
             innermost += k == 2;
             break;
@@ -705,6 +706,44 @@ TEST_CASE("02: an eye within glass") {
   });
 }
 
+// Catches: a camera whose rays begin in empty space wherever it is, bodies about it in the wrong order, a
+// body beside it that it is taken to be in, a place that is remembered when the camera has moved.
+TEST_CASE("02: a camera within glass sees through what it is in") {
+  Scene scene = scene_of({clear(1.5f, vec3(0.5f), vec3(1)), clear(1.5f, vec3(0.75f), vec3(0.25f)),
+                          glowing(vec3(1)), clear(1.1f)});
+  scene.meshes = {smooth_icosphere(3, 8)};
+  scene.spheres = {
+      {{0, 0, 0}, 3, 1}, {{-2, 0, 0}, 0.25f, 2}, {{0, 20, 0}, 3, 3}};  // an ember in the inner one
+  scene.features = features_of(scene);
+  WhittedSettings settings = whole_tree();
+  settings.antialiasing = Antialiasing::none;
+  for (const Backend backend : backends())
+    for (const Kernel kernel : {Kernel::split, Kernel::fused}) {
+      INFO(name(backend) << ", " << name(kernel));
+      settings.kernel = kernel;
+      WhittedRenderer renderer(scene, settings, backend);
+      const auto seen_from = [&](const vec3& eye) {
+        scene.camera.eye = eye;
+        scene.camera.target = {-2, 0, 0};
+        scene.camera.field_of_view = 1;
+        Film film(backend, 1, 1);
+        renderer.add_sample(film, scene.camera, 0, 0, 1000, [](double) { return true; });
+        return double(film.image(backend).pixels[0].x);
+      };
+      const auto a = [](double outer, double inner) { return std::exp(-outer - 0.25 * inner); };
+      CHECK(seen_from({1, 0, 0}) == Approx(a(0, 2.75)).epsilon(64 * u));
+      CHECK(seen_from({5, 0, 0}) == Approx(0.75 * a(2, 4.75)).epsilon(64 * u));
+      CHECK(seen_from({1, 0, 0}) == Approx(a(0, 2.75)).epsilon(64 * u));
+      CHECK(renderer.media_at({0, 0, 20}) == Media{});
+      Media both;
+      both.enter(1), both.enter(2);
+      CHECK(renderer.media_at({0.5f, 0.25f, 0}) == both);
+      Media other;
+      other.enter(3);
+      CHECK(renderer.media_at({0, 19, 0}) == other);
+    }
+}
+
 // Catches: anything but a number where two bodies share a face, light that is made there; a gap, which
 // scenes should leave, that does not help.
 TEST_CASE("02: bodies that share a face") {
@@ -756,6 +795,17 @@ TEST_CASE("02: more bodies in each other than are kept track of are told") {
     CHECK(seen[0].w < 0);
     CHECK(seen[1].w > 0);
     CHECK(seen[2].w == 1);
+    CHECK(renderer.overflows() == 1);
+  });
+  // and of shadow rays: seen is the floor alone, but its light comes through them all
+  scene.materials.push_back(Material{});
+  scene.planes = {{{0, 1, 0}, -20, 9}};
+  scene.lights = {lamp_at({0, 30, 0}, vec3(1), {1, 0, 0})};
+  with_each_renderer(scene, whole_tree(), [&](WhittedRenderer& renderer) {
+    const auto seen =
+        colours_of(renderer, {ray_from({40, -10, 0}, {-4, -1, 0}), ray_from({40, -10, 0}, {4, -1, 0})});
+    CHECK(seen[0].w < 0);
+    CHECK(seen[1].w > 0);
     CHECK(renderer.overflows() == 1);
   });
 }

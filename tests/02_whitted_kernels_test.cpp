@@ -246,7 +246,8 @@ TEST_CASE("02: a feature that is wrongly dropped shows") {
       const WhittedSettings settings = usual(scene, subject.height);
       const Stream stream(backend);
       const WhittedScene whitted_scene(scene, settings, stream);
-      BruteForceTracer tracer(whitted_scene, TriangleTest::watertight, stream);
+      StructureTracer tracer(whitted_scene, TriangleTest::watertight, brute_force(TriangleTest::watertight),
+                             stream);
       tracer.set_surely_ahead(surely_ahead(settings.terms));
       SplitTrees trees(stream);
       const Buffer<Ray> in(stream, rays);

@@ -149,6 +149,77 @@ TEST_CASE("02: a term that is off is missing, and the others stay") {
   });
 }
 
+// Catches: a cone of some hundredths of a degree that is rounded away or whose ramp has no digits, a step
+// (both angles the same) that is none.
+TEST_CASE("02: a narrow spot") {
+  for (const double outer : {0.02, 0.05, 1.0, 60.0, 90.0})
+    for (const double part : {0.0, 0.5, 1.0}) {
+      INFO(outer << " degrees, the inner one " << part << " of it");
+      Material m;
+      m.diffuse = vec3(1);
+      Scene scene = floor_of(m, true);
+      Light light = lamp_at({0, 10, 0}, vec3(1), {1, 0, 0});
+      light.kind = Light::Kind::spot;
+      light.direction = {0, -1, 0};
+      light.outer_angle = static_cast<float>(outer);
+      light.inner_angle = static_cast<float>(outer * part);
+      scene.lights = {light};
+      std::vector<Ray> rays;
+      std::vector<double> expected, allowed;
+      for (const double share : {0.0, 0.3, 0.7, 0.9, 1.1}) {
+        const double angle = share * outer * pi / 180;
+        if (angle > 1.5) continue;
+        const double x = 10 * std::tan(angle), cosine = std::cos(angle);
+        rays.push_back(ray_from({x, 5, 0}, {0, -1, 0}));
+        const auto opening = [](double degrees) { return 2 * std::pow(std::sin(degrees * pi / 360), 2); };
+        const double width = opening(outer) - opening(outer * part);
+        const double ramp = share > 1       ? 0
+                            : share <= part ? 1
+                                            : (opening(outer) - 2 * std::pow(std::sin(angle / 2), 2)) / width;
+        expected.push_back(ramp * ramp * cosine);
+        // |l + d|² is off by 4u|l + d|, and the ramp by that over its width
+        const double apart = 2 * std::sin(angle / 2);
+        allowed.push_back(width > 0 ? 8 * u + 2 * (4 * u * apart + 4 * u * u) / width + 64 * u : 64 * u);
+      }
+      with_each_renderer(scene, whole_tree(), [&](WhittedRenderer& renderer) {
+        const auto seen = colours_of(renderer, rays);
+        for (std::size_t i = 0; i < rays.size(); ++i)
+          if (!(std::fabs(seen[i].x - expected[i]) <= allowed[i]))
+            FAIL_CHECK("ray " << i << ": " << seen[i].x << ", not " << expected[i] << " +- " << allowed[i]);
+      });
+    }
+}
+
+// Catches: a pixel that is the sum of finite samples and not finite, a lamp that shines in a colour that it
+// does not have where its attenuation vanishes.
+TEST_CASE("02: a lamp at no distance shines in its own colour, and no pixel is infinite") {
+  Material m;
+  m.diffuse = vec3(0.8f);
+  Scene scene = floor_of(m, true);
+  scene.lights = {lamp_at({0, 1e-25f, 0}, {1, 0, 0})};
+  scene.camera.eye = {0, 1e-24f, 1e-25f};
+  scene.camera.target = vec3(0);
+  scene.features = features_of(scene);
+  for (const Backend backend : backends())
+    for (const Antialiasing method : all_antialiasing) {
+      INFO(name(backend) << ", " << name(method));
+      WhittedSettings settings;
+      settings.antialiasing = method;
+      WhittedRenderer renderer(scene, settings, backend);
+      Film film(backend, 8, 8);
+      for (std::uint32_t k = 0; k < 4; ++k)
+        renderer.add_sample(film, scene.camera, k, 0, 1000, [](double) { return true; });
+      bool bright = false;
+      for (const vec3& pixel : film.image(backend).pixels) {
+        REQUIRE((std::isfinite(pixel.x) && pixel.x >= 0));
+        CHECK(pixel.y == 0);
+        CHECK(pixel.z == 0);
+        bright = bright || pixel.x > 1e30f;
+      }
+      CHECK(bright);
+    }
+}
+
 // Catches: a cone of half its width, inner and outer exchanged, a ramp that is not squared, a sun with
 // attenuation or a place, light beyond the range or none just within.
 TEST_CASE("02: spots, suns and ranges") {

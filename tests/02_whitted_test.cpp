@@ -59,6 +59,17 @@ void check_sane(Scene& scene, const WhittedSettings& settings, const std::vector
 
 }  // namespace
 
+// Catches: a ray behind a surface that skips what lies one float behind it.
+TEST_CASE("the next float is the next one") {
+  for (const float t : {0.0f, 1e-45f, 1e-38f, 1.1754944e-38f, 1.0f, 1.9999999f, 1e30f})
+    CHECK(next_float(t) == std::nextafter(t, infinity));
+  for (int i = 0; i < 100000; ++i) {
+    Random random(3, i);
+    const float t = std::ldexp(random.uniform(1, 2), static_cast<int>(random.uniform(-140, 127)));
+    if (next_float(t) != std::nextafter(t, infinity)) FAIL_CHECK(t);
+  }
+}
+
 // Catches: a division by a distance of zero, an attenuation that overflows, a cosine with a lamp in the
 // surface that is NaN.
 TEST_CASE("02: lamps at, in and on surfaces, and far away") {

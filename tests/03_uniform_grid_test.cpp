@@ -700,7 +700,7 @@ TEST_CASE("a grid stays within its bytes and says so") {
       const Stream stream(backend);
       const Buffer positions(stream, copies.positions);
       const Buffer triangles(stream, copies.triangles);
-      const TriangleList list{positions.data(), triangles.data(), 1000000};
+      const TriangleArrays list{positions.data(), triangles.data(), 1000000};
       GridSettings settings = by_hand(1000, 1000, 1000);
       settings.most_bytes = 1 << 25;
       const Grid grid = build_grid(stream, list, settings);
@@ -724,7 +724,7 @@ TEST_CASE("a grid stays within its bytes and says so") {
     const Buffer triangles(stream, sphere.triangles);
     const auto count = static_cast<std::uint32_t>(sphere.triangles.size());
     for (const float density : {1.0f, 5.0f}) {
-      const TriangleList list{positions.data(), triangles.data(), count};
+      const TriangleArrays list{positions.data(), triangles.data(), count};
       const GridStatistics s = build_grid(stream, list, by_density(density)).statistics;
       const GridBuildTimes& t = s.times;
       CHECK(s.resolution.lowered == 0);

@@ -6,6 +6,7 @@
 
 #include "chapters/02_whitted/renderer.h"
 #include "common/math/random.h"
+#include "common/scene/made/solids.h"
 #include "tests/testing.h"
 
 namespace trilha::testing {
@@ -161,6 +162,50 @@ inline double sum_of_sizes(const dvec3& v) { return std::fabs(v.x) + std::fabs(v
 
 inline bool finite(const vec4& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z) && std::isfinite(v.w);
+}
+
+/// All that a setting can change: smooth, textured and thin triangles, glass that absorbs, a mirror, a ball,
+/// a plane, two lamps, ambient light and light from beyond; what is textured is small in the picture.
+inline Scene rich_scene() {
+  Material floor, ball, shiny = mirror(vec3(0.4f)), glass = clear(1.5f, vec3(0.9f), vec3(0.1f, 0.4f, 0.6f)),
+                        leaf, lamp = glowing({0.2f, 0.1f, 0});
+  shiny.specular = vec3(0.5f);
+  shiny.shininess = 20;
+  ball.specular = vec3(0.4f);
+  ball.shininess = 10;
+  glass.reflection = vec3(0.05f);
+  Scene scene = scene_of({floor, ball, shiny, glass, leaf, lamp});
+  std::vector<u8vec4> texels;
+  for (int k = 0; k < 64; ++k)
+    texels.push_back((k / 8 + k) % 2 ? u8vec4(255, 200, 90, 255) : u8vec4(60, 80, 160, 60));
+  scene.textures = {make_texture("chequer", 8, 8, texels, TextureUse::colour),
+                    make_texture("leaf", 8, 8, texels, TextureUse::data)};
+  scene.materials[0].diffuse_map.texture = 0;
+  scene.materials[0].diffuse_map.scale = {3, 3};
+  scene.materials[4].opacity_map.texture = 1;
+  scene.materials[4].opacity_map.channel = 3;
+  add_parallelogram(scene, {-4, 0, 3}, {8, 0, 0}, {0, 0, -8}, 0);
+  scene.meshes.push_back(smooth_icosphere(1, 0.7, {-1.3, 0.7, 0}));
+  scene.meshes.back().materials.assign(80, 1);
+  Mesh box = box_mesh({0.8, 0.01, -1}, {1.8, 1.2, 0}, 3);
+  scene.meshes.push_back(box);
+  add_parallelogram(scene, {-0.5, 0.1, 1.2}, {0.8, 0, 0}, {0, 0.8, 0}, 4);
+  for (Mesh& mesh : scene.meshes) {
+    if (mesh.normals.empty()) make_normals(mesh);
+    if (mesh.texture_coordinates.empty()) mesh.texture_coordinates.assign(mesh.positions.size(), vec2(0));
+  }
+  add_parallelogram(scene, {-3, 0.2, -3}, {6, 0, 0}, {0, 2, 0}, 2);
+  scene.meshes.back().normals.assign(4, vec3(0, 0, 1));
+  scene.spheres = {{{0.1f, 1.5f, -0.8f}, 0.5f, 5}};
+  scene.planes = {{{0, 1, 0}, -0.5f, 1}};
+  scene.lights = {lamp_at({2, 4, 3}, vec3(12)), lamp_at({-3, 3, 1}, {4, 5, 6}, {1, 0.5f, 0})};
+  scene.ambient = vec3(0.1f);
+  scene.environment.colour = {0.2f, 0.25f, 0.3f};
+  scene.camera.eye = {0.2f, 1.8f, 4.5f};
+  scene.camera.target = {0, 0.7f, 0};
+  scene.camera.field_of_view = 48;
+  scene.features = features_of(scene);
+  return scene;
 }
 
 }  // namespace trilha::testing

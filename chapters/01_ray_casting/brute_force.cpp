@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "chapters/01_ray_casting/ray_casting.h"
+#include "chapters/01_ray_casting/structure.h"
 #include "chapters/01_ray_casting/triangle_blocks.h"
 #include "common/parallel/for_each.h"
 
@@ -90,7 +90,51 @@ void answer(const Stream& stream, Loop loop, const Triangles<Test, T>& triangles
   }
 }
 
+struct CountAll {
+  std::uint32_t count;
+  Probe* probes;
+  TRILHA_HD void operator()(std::size_t i) const { probes[i] = {0, count}; }
+};
+
+template <class Test>
+class BruteForceStructure final : public TriangleStructure {
+ public:
+  BruteForceStructure(const Stream& stream, Loop loop, const TriangleArrays& of)
+      : stream_(stream),
+        loop_(loop),
+        count_(of.count),
+        numbers_(prepare_triangles<Test, float>(stream, loop, of.positions, of.triangles, of.count)) {}
+
+  void closest(const Ray* rays, Hit* hits, std::size_t n) const override {
+    trace_triangles(stream_, loop_, triangles(), rays, hits, n);
+  }
+  void occluded(const Ray* rays, std::uint8_t* occluded, std::size_t n) const override {
+    occluded_triangles(stream_, loop_, triangles(), rays, occluded, n);
+  }
+  void probe(const Ray*, Probe* probes, std::size_t n) const override {
+    for_each(stream_, n, CountAll{count_, probes});
+  }
+
+ private:
+  Triangles<Test> triangles() const {
+    return {numbers_.data(), count_, rules_.one_sided, rules_.surely_ahead};
+  }
+
+  Stream stream_;
+  Loop loop_;
+  std::uint32_t count_;
+  Buffer<float> numbers_;
+};
+
 }  // namespace
+
+MakeStructure brute_force(TriangleTest test, Loop loop) {
+  return [=](const Stream& stream, const TriangleArrays& triangles) {
+    return with_test(test, [&](auto chosen) -> std::unique_ptr<TriangleStructure> {
+      return std::make_unique<BruteForceStructure<decltype(chosen)>>(stream, loop, triangles);
+    });
+  };
+}
 
 template <class Test, class T>
 Buffer<T> prepare_triangles(const Stream& stream, Loop loop, const vec3* positions, const uvec3* triangles,

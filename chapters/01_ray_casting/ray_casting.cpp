@@ -111,7 +111,8 @@ TRILHA_HD vec3 Shade<reads>::colour(const Ray& ray, const Hit& hit) const {
 
 // ---- building ----------------------------------------------------------------
 
-RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream)
+RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream,
+                     const MakeStructure& make_structure)
     : settings_(settings), stream_(stream), bounds_(bounds(scene)) {
   count_ = static_cast<std::uint32_t>(scene.triangle_count());
   if (!settings.specialise) settings_.keep = {true, true, true, true, true};
@@ -139,15 +140,16 @@ RayCaster::RayCaster(const Scene& scene, const RayCastingSettings& settings, con
     }
     diffuse_ = Buffer(stream_, diffuse);
   }
-  with_test(settings_.test, [&](auto test) {
-    using Test = decltype(test);
-    if (settings_.scalar == Scalar::single_precision)
-      numbers_ = prepare_triangles<Test, float>(stream_, settings_.loop, positions_.data(), triangles_.data(),
-                                                count_);
-    else
-      wide_numbers_ = prepare_triangles<Test, double>(stream_, settings_.loop, positions_.data(),
-                                                      triangles_.data(), count_);
-  });
+  if (settings_.scalar == Scalar::single_precision) {
+    const auto make = make_structure ? make_structure : brute_force(settings_.test, settings_.loop);
+    structure_ = make(stream_, {positions_.data(), triangles_.data(), count_});
+    set_one_sided(settings_.one_sided);
+  } else {
+    with_test(settings_.test, [&](auto test) {
+      wide_numbers_ = prepare_triangles<decltype(test), double>(stream_, settings_.loop, positions_.data(),
+                                                                triangles_.data(), count_);
+    });
+  }
   stream_.synchronize();
   if (!reads_surface(settings_) && !keep.surface) positions_ = {}, triangles_ = {};
 }
@@ -175,12 +177,9 @@ struct NarrowHits {
 }  // namespace
 
 void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
+  if (structure_ != nullptr) return structure_->closest(rays, hits, n);
   with_test(settings_.test, [&](auto test) {
     using Test = decltype(test);
-    if (settings_.scalar == Scalar::single_precision) {
-      const Triangles<Test> triangles{numbers_.data(), count_, settings_.one_sided};
-      return trace_triangles(stream_, settings_.loop, triangles, rays, hits, n);
-    }
     if (wide_rays_.size() < n) {
       wide_rays_ = {}, wide_hits_ = {};  // freed before the new ones are made
       wide_rays_ = Buffer<RayOf<double>>(stream_.backend(), n);
@@ -191,6 +190,11 @@ void RayCaster::trace(const Ray* rays, Hit* hits, std::size_t n) const {
     trace_triangles(stream_, settings_.loop, triangles, wide_rays_.data(), wide_hits_.data(), n);
     for_each(stream_, n, NarrowHits{wide_hits_.data(), hits});
   });
+}
+
+void RayCaster::set_one_sided(bool one_sided) {
+  settings_.one_sided = one_sided;
+  if (structure_ != nullptr) structure_->set_rules({one_sided, false});
 }
 
 Hit RayCaster::trace(const Ray& ray) const {

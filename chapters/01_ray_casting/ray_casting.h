@@ -7,7 +7,7 @@
 #include <functional>
 #include <type_traits>
 
-#include "chapters/01_ray_casting/ray_triangle.h"
+#include "chapters/01_ray_casting/structure.h"
 #include "common/image/film.h"
 #include "common/math/random.h"
 #include "common/parallel/buffer.h"
@@ -117,16 +117,7 @@ struct BruteForce {
 
 // ---- settings ----------------------------------------------------------------
 
-enum class TriangleTest { plane, moller_trumbore, baldwin_weber, watertight };
-constexpr TriangleTest all_triangle_tests[] = {TriangleTest::plane, TriangleTest::moller_trumbore,
-                                               TriangleTest::baldwin_weber, TriangleTest::watertight};
-/// Its name as the settings have it.
-inline const char* name(TriangleTest test) {
-  constexpr const char* names[] = {"plane", "moller-trumbore", "baldwin-weber", "watertight"};
-  return names[static_cast<int>(test)];
-}
 enum class Scalar { single_precision, double_precision };
-enum class Loop { plain, blocked };
 enum class Shading { lambert, normals, depth, primitive, barycentrics, facing, tests };
 
 /// What is built or run although the scene and the shading do not need it: to measure what leaving it out
@@ -159,22 +150,6 @@ inline bool reads_surface(const RayCastingSettings& s) {
   return shows_normals(s) || s.shading == Shading::facing;
 }
 inline bool reads_normals(const RayCastingSettings& s) { return s.smooth && shows_normals(s); }
-
-/// Calls function(Test{}) with the chosen test's type.
-template <class Function>
-decltype(auto) with_test(TriangleTest test, const Function& function) {
-  switch (test) {
-    case TriangleTest::plane:
-      return function(PlaneBarycentric{});
-    case TriangleTest::moller_trumbore:
-      return function(MollerTrumbore{});
-    case TriangleTest::baldwin_weber:
-      return function(BaldwinWeber{});
-    case TriangleTest::watertight:
-      break;
-  }
-  return function(Watertight{});
-}
 
 // ---- the passes --------------------------------------------------------------
 
@@ -324,9 +299,11 @@ struct StageTimes {
 /// Builds what the settings need of a scene, then adds samples to a film.
 class RayCaster {
  public:
-  /// Throws InputError for a scene of more than 2³² − 2 triangles, DeviceError if the backend is missing,
-  /// Cancelled in work that was cancelled.
-  RayCaster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream);
+  /// Asks the structure that is made, by default none, in the settings' loop. Throws InputError for a scene
+  /// of more than 2³² − 2 triangles, DeviceError if the backend is missing, Cancelled in work that was
+  /// cancelled.
+  RayCaster(const Scene& scene, const RayCastingSettings& settings, const Stream& stream,
+            const MakeStructure& make_structure = {});
 
   /// Adds one sample to every pixel. keep_going(fraction) is asked after each band of about band_ms ms.
   /// Returns false if stopped early. Throws Cancelled in work that was cancelled; the film is then not to be
@@ -340,7 +317,7 @@ class RayCaster {
   Hit trace(const Ray& ray) const;
 
   /// The one setting that needs no rebuild.
-  void set_one_sided(bool one_sided) { settings_.one_sided = one_sided; }
+  void set_one_sided(bool one_sided);
   const StageTimes& times() const { return times_; }
   std::uint32_t triangle_count() const { return count_; }
   const Box& scene_bounds() const { return bounds_; }
@@ -360,7 +337,7 @@ class RayCaster {
   Buffer<vec2> texture_coordinates_;
   Buffer<std::uint32_t> materials_;
   Buffer<vec3> diffuse_;
-  Buffer<float> numbers_;
+  std::unique_ptr<TriangleStructure> structure_;
   Buffer<double> wide_numbers_;  ///< instead, where the scalar is double
   mutable Buffer<RayOf<double>> wide_rays_;
   mutable Buffer<HitOf<double>> wide_hits_;

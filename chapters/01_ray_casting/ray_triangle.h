@@ -398,6 +398,31 @@ struct Watertight : KeepsVertices {
   }
 };
 
+enum class TriangleTest { plane, moller_trumbore, baldwin_weber, watertight };
+constexpr TriangleTest all_triangle_tests[] = {TriangleTest::plane, TriangleTest::moller_trumbore,
+                                               TriangleTest::baldwin_weber, TriangleTest::watertight};
+/// Its name as the settings have it.
+inline const char* name(TriangleTest test) {
+  constexpr const char* names[] = {"plane", "moller-trumbore", "baldwin-weber", "watertight"};
+  return names[static_cast<int>(test)];
+}
+
+/// Calls function(Test{}) with the chosen test's type.
+template <class Function>
+decltype(auto) with_test(TriangleTest test, const Function& function) {
+  switch (test) {
+    case TriangleTest::plane:
+      return function(PlaneBarycentric{});
+    case TriangleTest::moller_trumbore:
+      return function(MollerTrumbore{});
+    case TriangleTest::baldwin_weber:
+      return function(BaldwinWeber{});
+    case TriangleTest::watertight:
+      break;
+  }
+  return function(Watertight{});
+}
+
 /// Expands DO(Test, T) for every test and scalar that the chapter compiles: for explicit instantiations.
 #define TRILHA_EVERY_TEST_AND_SCALAR(DO) \
   DO(PlaneBarycentric, float)            \

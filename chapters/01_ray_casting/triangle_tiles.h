@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "chapters/01_ray_casting/ray_casting.h"
+#include "common/parallel/cancellation.h"
 #include "cuda/check.h"
 
 namespace trilha {
@@ -180,6 +181,7 @@ __global__ void __launch_bounds__(tile_threads, 3)
 template <Query query, class Test, class T>
 void trace_tiles(const Stream& stream, const Triangles<Test, T>& triangles, const RayOf<T>* rays,
                  QueryAnswer<query, T>* answers, std::size_t n) {
+  stop_if_cancelled();
   if (n == 0) return;
   constexpr std::size_t rays_a_block = tile_threads * rays_a_thread<T>;
   const auto blocks = static_cast<unsigned>((n + rays_a_block - 1) / rays_a_block);

@@ -12,6 +12,7 @@ struct Media {
   std::uint16_t entered[most] = {};
   std::uint16_t count = 0;  ///< may exceed `most`: then the first ones are forgotten
 
+  bool operator==(const Media&) const = default;
   TRILHA_HD std::uint16_t top() const { return count > 0 ? entered[kept() - 1] : std::uint16_t{0}; }
   TRILHA_HD int kept() const { return count < most ? count : most; }
 

@@ -20,7 +20,7 @@ std::vector<TreeRay> ray_tree(const ShadingView& view, const Terms& terms, const
     Node node;
     const char* kind;
   };
-  std::vector<Pending> pending{{{eye_ray, vec3(1), 0, Media{}, 0}, "eye"}};
+  std::vector<Pending> pending{{{eye_ray, vec3(1), 0, terms.eye, 0}, "eye"}};
   std::vector<TreeRay> tree;
   while (!pending.empty() && tree.size() < most) {
     const Pending next = pending.back();

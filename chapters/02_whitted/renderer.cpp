@@ -2,44 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "chapters/02_whitted/eye_media.h"
 #include "common/parallel/algorithms.h"
 #include "common/parallel/bands.h"
 #include "common/parallel/for_each.h"
 
 namespace trilha {
 namespace {
-
-/// Ray i against one primitive.
-template <class Test>
-struct MeetsPrimitive {
-  ShadingView view;
-  bool surely_ahead;
-  const Ray* rays;
-  const std::uint32_t* primitives;
-  std::uint8_t* met;
-
-  TRILHA_HD void operator()(std::size_t i) const {
-    const std::uint32_t p = primitives[i];
-    const Ray ray = rays[i];
-    Hit hit;
-    hit.t = ray.t_max;
-    if (p < view.triangle_count()) {
-      const Corners<vec3> corners = view.corners(p);
-      float numbers[Test::numbers];
-      Test::prepare(corners.a, corners.b, corners.c, numbers);
-      const Triangles<Test> alone{numbers, 1, false, surely_ahead};
-      alone.intersect(0, ray, alone.constants(ray), hit);
-      met[i] = hit.found() ? 1 : 0;
-      return;
-    }
-    if (p - view.spheres.first < view.spheres.count)
-      view.spheres.intersect(p - view.spheres.first, ray, hit);
-    else if (p - view.planes.first < view.planes.count)
-      view.planes.intersect(p - view.planes.first, ray, {}, hit);
-    met[i] = hit.found() ? 1 : 0;
-  }
-};
 
 /// What came back of a band, counted: the rays, and from bit 44 on, the trees that overflowed.
 struct CountRays {
@@ -61,6 +32,17 @@ struct ShowEffort {
   }
 };
 
+/// What the eye's ray takes in the structure.
+struct ShowStructure {
+  Show show;
+  const Probe* probes;
+  vec4* colours;
+  TRILHA_HD void operator()(std::size_t i) const {
+    const std::uint32_t n = show == Show::visited ? probes[i].nodes_visited : probes[i].primitives_tested;
+    colours[i] = vec4(vec3(static_cast<float>(n)), 1);
+  }
+};
+
 /// A value of every index → its pixel.
 struct AddToFilm {
   Tiling tiling;
@@ -72,85 +54,43 @@ struct AddToFilm {
     const auto pixel = tiling.pixel(i);
     if (!tiling.inside(pixel)) return;
     const vec4& value = values[i - first];
-    film[tiling.offset(pixel)] += vec4(fourth ? vec3(value.w) : vec3(value), 1);
+    vec4& sum = film[tiling.offset(pixel)];
+    sum += vec4(fourth ? vec3(value.w) : vec3(value), 1);
+    for (int c = 0; c < 3; ++c) sum[c] = min(sum[c], std::numeric_limits<float>::max());
   }
 };
 
 }  // namespace
 
-// ---- brute force -------------------------------------------------------------
-
-BruteForceTracer::BruteForceTracer(const WhittedScene& scene, TriangleTest test, const Stream& stream)
-    : stream_(stream), test_(test), view_(scene.view()) {
-  const auto fill = [&](Among among, const PrimitiveCounts& begin, const PrimitiveCounts& end) {
-    Part& part = parts_[static_cast<int>(among)];
-    part.first = begin.triangles;
-    part.count = end.triangles - begin.triangles;
-    part.spheres = {view_.spheres.spheres + begin.spheres, end.spheres - begin.spheres,
-                    view_.spheres.first + begin.spheres};
-    part.planes = {view_.planes.planes + begin.planes, end.planes - begin.planes,
-                   view_.planes.first + begin.planes};
-    with_test(test_, [&](auto chosen) {
-      part.numbers = prepare_triangles<decltype(chosen), float>(stream_, Loop::blocked, scene.positions(),
-                                                                scene.triangles() + part.first, part.count);
-    });
-  };
-  const PrimitiveCounts all{view_.triangle_count(), view_.spheres.count, view_.planes.count};
-  fill(Among::all, {}, all);
-  const PrimitiveCounts& opaque = scene.opaque();
-  parted_ = opaque.triangles + opaque.spheres + opaque.planes != all.triangles + all.spheres + all.planes;
-  if (parted_) {
-    fill(Among::opaque, {}, opaque);
-    fill(Among::clear, opaque, all);
-  }
-}
-
-void BruteForceTracer::closest(Among among, const Ray* rays, Hit* hits, std::size_t n) const {
-  const Part& of = part(among);
-  with_test(test_, [&](auto chosen) {
-    const Triangles<decltype(chosen)> triangles{of.numbers.data(), of.count, false, surely_ahead_};
-    trace_triangles(stream_, Loop::blocked, triangles, rays, hits, n);
-  });
-  if (of.first + of.spheres.count + of.planes.count > 0)
-    for_each(stream_, n, TraceBodies{of.first, of.spheres, of.planes, rays, hits});
-}
-
-void BruteForceTracer::occluded(Among among, const Ray* rays, std::uint8_t* occluded, std::size_t n) const {
-  const Part& of = part(among);
-  with_test(test_, [&](auto chosen) {
-    const Triangles<decltype(chosen)> triangles{of.numbers.data(), of.count, false, surely_ahead_};
-    occluded_triangles(stream_, Loop::blocked, triangles, rays, occluded, n);
-  });
-  if (of.spheres.count + of.planes.count > 0)
-    for_each(stream_, n, TraceOccludedBodies{of.spheres, of.planes, rays, occluded});
-}
-
-void BruteForceTracer::meets(const Ray* rays, const std::uint32_t* primitives, std::uint8_t* met,
-                             std::size_t n) const {
-  with_test(test_, [&](auto chosen) {
-    for_each(stream_, n, MeetsPrimitive<decltype(chosen)>{view_, surely_ahead_, rays, primitives, met});
-  });
-}
-
 // ---- building ----------------------------------------------------------------
 
-WhittedRenderer::WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream)
+WhittedRenderer::WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream,
+                                 const MakeStructure& make_structure)
     : settings_(settings), stream_(stream), scene_(scene, settings, stream), split_(stream) {
   const bool general = settings.keep.general_kernel || !settings.specialise;
   features_ = general ? feature::every : scene_.features();
   const std::uint32_t count = scene_.triangle_count();
   if (settings.kernel == Kernel::split)
-    tracer_ = std::make_unique<BruteForceTracer>(scene_, settings.test, stream_);
+    tracer_ = std::make_unique<StructureTracer>(
+        scene_, settings.test, make_structure ? make_structure : brute_force(settings.test), stream_);
   else if (settings.kernel == Kernel::fused)
     numbers_ = prepare_triangles<Watertight, float>(stream_, Loop::plain, scene_.positions(),
                                                     scene_.triangles(), count);
   else
     rt_gpu_ = std::make_unique<RtGpu>(scene_, settings.kernel, settings.block_width, settings.block_height,
                                       stream_);
+  set(settings);
   stream_.synchronize();
 }
 
 WhittedRenderer::~WhittedRenderer() = default;
+
+void WhittedRenderer::set(const WhittedSettings& settings) {
+  const Media eye = settings_.terms.eye;
+  settings_ = settings;
+  settings_.terms.eye = eye;
+  if (tracer_ != nullptr) tracer_->set_surely_ahead(surely_ahead(settings_.terms));
+}
 
 // ---- rendering ---------------------------------------------------------------
 
@@ -158,7 +98,6 @@ void WhittedRenderer::colours(const Ray* rays, vec4* colours, std::size_t n) {
   if (n == 0) return;
   Timer timer(stream_);
   if (settings_.kernel == Kernel::split) {
-    tracer_->set_surely_ahead(surely_ahead(settings_.terms));
     split_.colours(scene_.view(), *tracer_, settings_.terms, features_, settings_.shadow_cache, rays, colours,
                    n);
   } else if (settings_.kernel == Kernel::fused) {
@@ -185,16 +124,49 @@ std::optional<KernelCost> WhittedRenderer::kernel_cost() const {
   return settings_.kernel == Kernel::fused ? fused_cost(stream_, features_) : split_.shading_cost(features_);
 }
 
+void WhittedRenderer::closest(const Ray* rays, Hit* hits, std::size_t n) const {
+  if (tracer_ != nullptr) return tracer_->closest(Among::all, rays, hits, n);
+  constexpr TriangleTest test = TriangleTest::watertight;
+  StructureTracer(scene_, test, brute_force(test), stream_).closest(Among::all, rays, hits, n);
+}
+
 Hit WhittedRenderer::trace(const Ray& ray) const {
   const Buffer<Ray> rays(stream_, {ray});
   Buffer<Hit> hits(stream_.backend(), 1);
-  if (tracer_ != nullptr) {
-    tracer_->closest(Among::all, rays.data(), hits.data(), 1);
-  } else {
-    const BruteForceTracer tracer(scene_, TriangleTest::watertight, stream_);
-    tracer.closest(Among::all, rays.data(), hits.data(), 1);
-  }
+  closest(rays.data(), hits.data(), 1);
   return hits.to_vector(stream_)[0];
+}
+
+Media WhittedRenderer::media_at(const vec3& point) const {
+  if ((scene_.features() & feature::glass) == 0 || !scene_.may_be_in_glass(point)) return {};
+  // any way out will do, unless it touches an edge on which rounding decides: the third one settles that
+  constexpr int n = 3;
+  const vec3 directions[n] = {{0.437f, 0.721f, 0.538f}, {-0.654f, 0.313f, 0.689f}, {0.291f, -0.577f, 0.763f}};
+  std::vector<Ray> from(n);
+  for (int i = 0; i < n; ++i) from[i].origin = point, from[i].direction = directions[i];
+  Buffer<Ray> rays(stream_, from);
+  Buffer<Hit> hits(stream_.backend(), n);
+  Buffer<WayOut> ways(stream_, std::vector<WayOut>(n));
+  const auto inside = [](const Ray& ray) { return ray.t_min < ray.t_max; };
+  do {
+    closest(rays.data(), hits.data(), n);
+    for_each(stream_, n, GoOut{scene_.view(), hits.data(), rays.data(), ways.data()});
+    from = rays.to_vector(stream_);
+  } while (std::any_of(from.begin(), from.end(), inside));
+  Media found[n];
+  for (int i = 0; i < n; ++i) found[i] = entered_before(ways.to_vector(stream_)[i]);
+  return found[1] == found[2] ? found[1] : found[0];
+}
+
+Terms WhittedRenderer::terms_of(const Camera& camera, std::uint32_t height) {
+  if (eye_ != camera.eye) {
+    settings_.terms.eye = media_at(camera.eye);
+    eye_ = camera.eye;
+  }
+  Terms terms = settings_.terms;
+  terms.pixel_angle =
+      static_cast<float>(2 * std::tan(glm::radians(double(camera.field_of_view)) / 2) / std::max(height, 1u));
+  return terms;
 }
 
 bool WhittedRenderer::add_sample(Film& film, const Camera& camera, std::uint32_t sample, std::uint64_t seed,
@@ -202,9 +174,8 @@ bool WhittedRenderer::add_sample(Film& film, const Camera& camera, std::uint32_t
   const Tiling& tiling = film.tiling();
   const auto pinhole =
       PinholeCamera::make(camera, static_cast<int>(tiling.width), static_cast<int>(tiling.height));
-  settings_.terms.pixel_angle = static_cast<float>(
-      2 * std::tan(glm::radians(double(camera.field_of_view)) / 2) / std::max(tiling.height, 1u));
-  return settings_.antialiasing == Antialiasing::adaptive
+  settings_.terms = terms_of(camera, tiling.height);
+  return settings_.antialiasing == Antialiasing::adaptive && !shows_structure(settings_.show)
              ? add_adaptive(film, pinhole, band_ms, keep_going)
              : add_pattern(film, pinhole, sample, seed, band_ms, keep_going);
 }
@@ -239,9 +210,19 @@ bool WhittedRenderer::add_pattern(Film& film, const PinholeCamera& camera, std::
                             static_cast<std::uint32_t>(settings_.across), sample, seed,
                             settings_.terms.farthest, rays});
         times_.rays += rays_timer.milliseconds();
-        colours(rays, out, n);
+        if (shows_structure(settings_.show) && tracer_ != nullptr) {
+          Timer trace_timer(stream_);
+          Probe* probes = probes_.at_least(stream_.backend(), n);
+          tracer_->probe(rays, probes, n);
+          for_each(stream_, n, ShowStructure{settings_.show, probes, out});
+          times_.trace += trace_timer.milliseconds();
+          rays_ += static_cast<double>(n);
+        } else {
+          colours(rays, out, n);
+        }
         Timer film_timer(stream_);
-        if (settings_.show != Show::picture) for_each(stream_, n, ShowEffort{settings_.show, out});
+        if (settings_.show == Show::rays || settings_.show == Show::samples)
+          for_each(stream_, n, ShowEffort{settings_.show, out});
         for_each(stream_, {begin, end}, AddToFilm{tiling, begin, out, false, film.pixels()});
         times_.film += film_timer.milliseconds();
         indices_per_ms_ = static_cast<double>(n) / std::max(band_timer.milliseconds(), 1e-3);
@@ -254,7 +235,10 @@ bool WhittedRenderer::add_adaptive(Film& film, const PinholeCamera& camera, doub
   const Tiling& tiling = film.tiling();
   const Backend backend = stream_.backend();
   const float farthest = settings_.terms.farthest;
-  const std::size_t group = backend == Backend::cuda ? 64 : 1, most = backend == Backend::cuda ? 32 : 16;
+  // a pixel may be quartered into 4^depth squares: few tiles at a time, so that they stay in memory
+  const int deeper = std::max(settings_.adaptive_depth - 3, 0);
+  const std::size_t group = backend == Backend::cuda ? std::size_t{64} >> 2 * deeper : 1,
+                    most = std::max<std::size_t>((backend == Backend::cuda ? 32 : 16) >> 2 * deeper, 1);
   return for_each_band(
       stream_, (tiling.tiles() + group - 1) / group, 1, most, band_ms,
       [&](std::size_t first_group, std::size_t end_group) {

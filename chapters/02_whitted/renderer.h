@@ -13,45 +13,12 @@
 
 namespace trilha {
 
-/// Brute force over a scene's triangles by chapter 01's loops, and over its spheres and planes.
-class BruteForceTracer final : public Tracer {
- public:
-  BruteForceTracer(const WhittedScene& scene, TriangleTest test, const Stream& stream);
-
-  /// Are hits only those that are beyond the error of their t?
-  void set_surely_ahead(bool surely_ahead) { surely_ahead_ = surely_ahead; }
-
-  bool any_clear() const override { return parted_; }
-  void closest(Among among, const Ray* rays, Hit* hits, std::size_t n) const override;
-  void occluded(Among among, const Ray* rays, std::uint8_t* occluded, std::size_t n) const override;
-  void meets(const Ray* rays, const std::uint32_t* primitives, std::uint8_t* met,
-             std::size_t n) const override;
-
- private:
-  /// Some of the primitives; those of each kind lie together.
-  struct Part {
-    std::uint32_t first = 0, count = 0;  ///< of its triangles
-    Spheres<float> spheres{};
-    Planes<float> planes{};
-    Buffer<float> numbers;
-  };
-  const Part& part(Among among) const {
-    return parts_[static_cast<int>(among == Among::opaque && !parted_ ? Among::all : among)];
-  }
-
-  Stream stream_;
-  TriangleTest test_;
-  ShadingView view_;
-  bool surely_ahead_ = true;
-  bool parted_ = false;  ///< else all is opaque
-  Part parts_[3];
-};
-
 class WhittedRenderer {
  public:
-  /// Throws what WhittedScene does, DeviceError if the backend is missing, Cancelled in work that was
-  /// cancelled.
-  WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream);
+  /// Split kernels ask the structure that is made; by default brute force. Throws what WhittedScene and the
+  /// structure do, DeviceError if the backend is missing, Cancelled in work that was cancelled.
+  WhittedRenderer(const Scene& scene, const WhittedSettings& settings, const Stream& stream,
+                  const MakeStructure& make_structure = {});
   ~WhittedRenderer();
 
   /// Adds sample number `sample` to every pixel; of the adaptive method, all of it. keep_going(fraction) is
@@ -64,11 +31,16 @@ class WhittedRenderer {
   /// Both arrays lie on the stream's backend.
   void colours(const Ray* rays, vec4* colours, std::size_t n);
 
+  /// The glass bodies that a point is in.
+  Media media_at(const vec3& point) const;
+
   /// The nearest hit of a ray of the host.
   Hit trace(const Ray& ray) const;
 
   /// Settings that need no rebuild: the terms' numbers and the pattern.
-  void set(const WhittedSettings& settings) { settings_ = settings; }
+  void set(const WhittedSettings& settings);
+  /// What the terms say of a camera: the width of its pixels, and what glass its eye is in.
+  Terms terms_of(const Camera& camera, std::uint32_t height);
 
   /// What the kernel that shades, of those that are not split the one kernel, takes of a CUDA device; nothing
   /// on the CPU.
@@ -84,10 +56,12 @@ class WhittedRenderer {
   WhittedTimes times() const {
     WhittedTimes all = split_.times();
     all.rays = times_.rays, all.trees = times_.trees, all.film = times_.film;
+    all.trace += times_.trace;
     return all;
   }
 
  private:
+  void closest(const Ray* rays, Hit* hits, std::size_t n) const;
   bool add_pattern(Film& film, const PinholeCamera& camera, std::uint32_t sample, std::uint64_t seed,
                    double band_ms, const std::function<bool(double)>& keep_going);
   bool add_adaptive(Film& film, const PinholeCamera& camera, double band_ms,
@@ -97,8 +71,9 @@ class WhittedRenderer {
   Stream stream_;
   WhittedScene scene_;
   unsigned features_;
-  std::unique_ptr<BruteForceTracer> tracer_;
-  Buffer<float> numbers_;  ///< of the triangles, for the fused kernel
+  std::unique_ptr<Tracer> tracer_;  ///< of split kernels
+  std::optional<vec3> eye_;         ///< for which the terms know what it is in
+  Buffer<float> numbers_;           ///< of the triangles, for the fused kernel
   std::unique_ptr<RtGpu> rt_gpu_;
   SplitTrees split_;
   WhittedTimes times_;
@@ -106,6 +81,7 @@ class WhittedRenderer {
   std::uint64_t overflows_ = 0;
   Scratch<Ray> sample_rays_;
   Scratch<vec4> colours_, pixels_;
+  Scratch<Probe> probes_;
   Scratch<std::uint64_t> counts_;
   Scratch<Square> squares_, next_squares_;
   Scratch<std::uint8_t> flags_;

@@ -83,7 +83,7 @@ RtGpu::RtGpu(const WhittedScene& scene, Kernel version, int block_width, int blo
   for (const Lamp& l : scene.lamps())
     lamps.insert(lamps.end(),
                  {vec4(l.position, as_float(static_cast<std::uint32_t>(l.kind))), vec4(l.direction, l.range),
-                  vec4(l.intensity, l.cos_inner), vec4(l.attenuation, l.cos_outer)});
+                  vec4(l.intensity, l.inner), vec4(l.attenuation, l.outer)});
   for (const WhittedMaterial& m : scene.materials())
     materials.insert(materials.end(),
                      {vec4(m.diffuse, m.shininess), vec4(m.specular, 0), vec4(m.emission, as_float(m.medium)),

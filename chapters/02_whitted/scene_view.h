@@ -5,6 +5,7 @@
 
 #include "chapters/01_ray_casting/ray_casting.h"
 #include "chapters/02_whitted/bodies.h"
+#include "chapters/02_whitted/media.h"
 #include "chapters/02_whitted/offsets.h"
 #include "chapters/02_whitted/optics.h"
 #include "chapters/02_whitted/textures.h"
@@ -27,6 +28,7 @@ struct Terms {
   float fixed_offset = 5e-5f;
   float farthest = 1e30f;  ///< what is beyond is not seen
   TextureFilter filter = TextureFilter::trilinear;
+  Media eye;              ///< the glass bodies that the eye is in
   float pixel_angle = 0;  ///< between the rays of neighbouring pixels, in radians: the width of a ray cone
 };
 constexpr int most_depth = 64;
@@ -95,7 +97,7 @@ struct Medium {
 struct Lamp {
   Light::Kind kind;
   vec3 position, direction, intensity, attenuation;
-  float range, cos_inner, cos_outer;
+  float range, inner, outer;  ///< of a spot: 1 - cos of its cones' half angles
 };
 
 /// A triangle's corners, and what is wanted at them.

@@ -26,7 +26,9 @@ inline const char* name(Kernel kernel) {
 inline bool is_rt_gpu(Kernel kernel) { return kernel >= Kernel::rt_gpu; }
 
 /// What a pixel shows: its light, or what that took.
-enum class Show { picture, rays, samples };
+enum class Show { picture, rays, samples, visited, tested };
+/// Is that what the eye's rays take in a structure?
+inline bool shows_structure(Show show) { return show == Show::visited || show == Show::tested; }
 
 /// What is uploaded or compiled in although scene and settings do not need it: to measure what leaving it out
 /// saves.

@@ -24,11 +24,12 @@ struct PlantRoots {
   const Ray* roots;
   const std::uint32_t* indices;
   Ray* rays;
+  Media eye;
   NodeState* states;
   std::uint32_t* root_numbers;
   TRILHA_HD void operator()(std::size_t k) const {
     rays[k] = roots[indices[k]];
-    states[k] = {vec3(1), 0, Media{}, 0};
+    states[k] = {vec3(1), 0, eye, 0};
     root_numbers[k] = indices[k];
   }
 };
@@ -82,7 +83,7 @@ struct ShadeEntry {
             continue;
           }
           shadow_rays[slot + l] = shadow_ray(s, terms, lamp.position, in);
-          shadows[slot + l] = {local, roots[i], node.media, 0};
+          shadows[slot + l] = {local, roots[i], node.media, 0, 0};
           shadow_flags[slot + l] = 1;
         }
       }
@@ -187,7 +188,8 @@ struct PassShadows {
     rays[active[k]].t_min = shadow.ray.t_min;
     state.light = shadow.light;
     state.media = shadow.media;
-    state.rays += state.rays < 0xffff ? 1 : 0;
+    state.rays += state.rays < 0x7fff ? 1 : 0;
+    if (shadow.media.count > Media::most) state.overflow = 1;
   }
 };
 struct GatherIndices {
@@ -217,10 +219,14 @@ struct AddLamps {
   TRILHA_HD void operator()(std::size_t i) const {
     if (i > 0 && roots[i] == roots[i - 1]) return;
     vec4 sum = lamp_light[roots[i]];
+    bool overflow = sum.w < 0;  // as of colours
+    sum.w = std::fabs(sum.w);
     for (std::size_t k = i; k < n && roots[k] == roots[i]; ++k) {
       const ShadowState& state = states[order[k]];
       sum += vec4(state.light, static_cast<float>(state.rays));
+      overflow = overflow || state.overflow != 0;
     }
+    if (overflow) sum.w = -sum.w;
     lamp_light[roots[i]] = sum;
   }
 };
@@ -228,10 +234,10 @@ struct AddUp {
   const vec4* lamp_light;
   vec4* colours;
   TRILHA_HD void operator()(std::size_t i) const {
-    const float rays = std::fabs(colours[i].w) + lamp_light[i].w;
+    const float rays = std::fabs(colours[i].w) + std::fabs(lamp_light[i].w);
     vec3 sum = vec3(colours[i]) + vec3(lamp_light[i]);
     for (int c = 0; c < 3; ++c) sum[c] = min(sum[c], std::numeric_limits<float>::max());
-    colours[i] = vec4(sum, colours[i].w < 0 ? -rays : rays);
+    colours[i] = vec4(sum, colours[i].w < 0 || lamp_light[i].w < 0 ? -rays : rays);
   }
 };
 
@@ -301,8 +307,8 @@ void SplitTrees::colours(const ShadingView& view, const Tracer& tracer, const Te
   for_each(stream_, n, IsRay{rays, flags});
   const std::size_t roots = compact(stream_, flags, n, indices);
   for_each(stream_, roots,
-           PlantRoots{rays, indices, rays_.at_least(backend, roots), states_.at_least(backend, roots),
-                      roots_.at_least(backend, roots)});
+           PlantRoots{rays, indices, rays_.at_least(backend, roots), terms.eye,
+                      states_.at_least(backend, roots), roots_.at_least(backend, roots)});
   segments_ = {{0, roots}};
   // A piece fills the machine; its buffers take some 350 bytes an entry and 70 a shadow ray.
   const std::size_t most = backend == Backend::cuda ? 1 << 22 : 1 << 18;

@@ -50,7 +50,8 @@ struct ShadowState {
   vec3 light;  ///< what of the lamp's light is left, as it counts in the pixel
   std::uint32_t root;
   Media media;
-  std::uint16_t rays;  ///< that were cast for it
+  std::uint16_t rays : 15;     ///< that were cast for it, as far as they can be counted here
+  std::uint16_t overflow : 1;  ///< was it in more bodies than Media holds?
 };
 
 /// What shadow caching did.

@@ -54,6 +54,7 @@ class LeavingRays final : public Tracer {
     for (std::size_t i = 0; i < roots; ++i) alive_[i] = i;
   }
 
+  void set_surely_ahead(bool) override {}  // as the one that is asked has it
   bool any_clear() const override { return asked_.any_clear(); }
   void closest(Among among, const Ray* rays, Hit* hits, std::size_t n) const override {
     asked_.closest(among, rays, hits, n);
@@ -77,6 +78,7 @@ class LeavingRays final : public Tracer {
              std::size_t n) const override {
     asked_.meets(rays, primitives, met, n);
   }
+  void probe(const Ray* rays, Probe* probes, std::size_t n) const override { asked_.probe(rays, probes, n); }
 
   mutable std::vector<dvec3> directions;
 
@@ -96,7 +98,7 @@ Seen look(Backend backend, const Panel& panel, const WhittedSettings& settings) 
                                       [](const Wanted& w) { return w.direction != dvec3(0); });
   if (directions && settings.kernel == Kernel::split && settings.terms.fresnel == Fresnel::constant) {
     const WhittedScene scene(panel.scene, settings, stream);
-    BruteForceTracer tracer(scene, settings.test, stream);
+    StructureTracer tracer(scene, settings.test, brute_force(settings.test), stream);
     tracer.set_surely_ahead(surely_ahead(settings.terms));
     const LeavingRays leaving(stream, tracer, n);
     SplitTrees trees(stream);

@@ -1,6 +1,8 @@
 #pragma once
 // What is known where a ray meets a surface: its point, normals and material, with the maps looked up.
 
+#include <cstring>
+
 #include "chapters/02_whitted/bump_maps.h"
 #include "chapters/02_whitted/scene_view.h"
 
@@ -20,7 +22,12 @@ struct Surface {
 
 /// The next larger float of a finite positive number or zero.
 TRILHA_HD inline float next_float(float t) {
-  return t + max(t * 1.2e-7f, std::numeric_limits<float>::denorm_min());
+  const float positive = t + 0.0f;  // -0 becomes 0
+  std::uint32_t bits;
+  std::memcpy(&bits, &positive, sizeof bits);
+  ++bits;
+  std::memcpy(&t, &bits, sizeof t);
+  return t;
 }
 
 /// How far to move `point` of a smooth triangle so that it lies on the surface that the normals pretend: onto

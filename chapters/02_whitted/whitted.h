@@ -35,17 +35,22 @@ TRILHA_HD bool incident(const Lamp& lamp, const Terms& terms, const vec3& point,
   if (!(in.distance > 0) || (lamp.range > 0 && in.distance > lamp.range)) return false;
   if ((features & feature::lamps) != 0 && lamp.kind == Light::Kind::spot) {
     // from the outer cone to the inner one as glTF's KHR_lights_punctual has it: the square of a ramp in the
-    // cosine
-    const float cosine = -fused_dot(in.direction, lamp.direction);
-    if (!(cosine > lamp.cos_outer)) return false;
-    const float ramp = min((cosine - lamp.cos_outer) / max(lamp.cos_inner - lamp.cos_outer, 1e-6f), 1.0f);
-    in.light *= ramp * ramp;
+    // cosine, here in 1 - cos of the angle between unit vectors, which keeps its digits near the axis
+    const vec3 apart = in.direction + lamp.direction;
+    const float off = fused_dot(apart, apart) / 2;
+    if (!(off < lamp.outer)) return false;
+    if (off > lamp.inner) {
+      const float ramp = (lamp.outer - off) / (lamp.outer - lamp.inner);
+      in.light *= ramp * ramp;
+    }
   }
   if (terms.attenuation) {
-    // Horner's scheme; what overflows sends nothing, and no light is stronger than the largest float
+    // Horner's scheme; what overflows sends nothing, no light is stronger than the largest float, and a
+    // colour that the lamp does not have stays away where the divisor vanishes
     const vec3& k = lamp.attenuation;
-    in.light /= fma(fma(k.z, in.distance, k.y), in.distance, k.x);
-    for (int c = 0; c < 3; ++c) in.light[c] = min(in.light[c], std::numeric_limits<float>::max());
+    const float divisor = fma(fma(k.z, in.distance, k.y), in.distance, k.x);
+    for (int c = 0; c < 3; ++c)
+      in.light[c] = in.light[c] > 0 ? min(in.light[c] / divisor, std::numeric_limits<float>::max()) : 0.0f;
   }
   return true;
 }
@@ -256,6 +261,14 @@ constexpr int branch_kinds = ((features & feature::alpha) != 0 ? 1 : 0) +
 template <unsigned features>
 constexpr int stack_size = 1 + most_depth*(branch_kinds<features> > 1 ? branch_kinds<features> - 1 : 0);
 
+/// Room for n values that are written before they are read. An array of them would be filled first, and for a
+/// stack that is most of its cost.
+template <class T, int n>
+struct Room {
+  alignas(T) unsigned char bytes[n * sizeof(T)];
+  TRILHA_HD T* data() { return reinterpret_cast<T*>(bytes); }
+};
+
 /// The light that comes along a ray: the whole tree, depth first. Returned with it, fourth: how many rays
 /// that took, shadow rays among them. `overflow` becomes true if a ray was in more bodies than Media holds.
 template <unsigned features, class View, class Structure>
@@ -264,9 +277,10 @@ TRILHA_HD vec4 whitted(const View& view, const Structure& structure, const Terms
   NoProbe probe;
   vec3 sum(0);
   float rays = 0;
-  Node stack[stack_size<features>];
+  Room<Node, stack_size<features>> room;
+  Node* stack = room.data();
   int pending = 0;
-  stack[pending++] = {eye_ray, vec3(1), 0, Media{}, 0};
+  stack[pending++] = {eye_ray, vec3(1), 0, terms.eye, 0};
   while (pending > 0) {
     const Node node = stack[--pending];
     overflow = overflow || node.media.count > Media::most;
@@ -293,8 +307,10 @@ TRILHA_HD vec4 whitted(const View& view, const Structure& structure, const Terms
           rays += 1;
           if (structure.occluded(shadow.ray, probe)) continue;
         } else {
-          do rays += 1;
-          while (pass_shadow<features>(view, terms, shadow, structure.closest(shadow.ray, probe)));
+          do {
+            rays += 1;
+            overflow = overflow || shadow.media.count > Media::most;
+          } while (pass_shadow<features>(view, terms, shadow, structure.closest(shadow.ray, probe)));
           local *= shadow.light;
         }
       }

@@ -118,6 +118,16 @@ WhittedScene::WhittedScene(const Scene& scene, const WhittedSettings& settings, 
       std::stable_partition(planes.begin(), planes.end(), of_its_own) - planes.begin());
   opaque_.triangles = opaque_first(mesh, is_opaque);
 
+  const auto is_glass = [&](std::uint32_t m) { return host_materials_[m].medium != 0; };
+  for (std::size_t i = opaque_.triangles; i < mesh.triangles.size(); ++i)
+    if (is_glass(mesh.materials.empty() ? 0 : mesh.materials[i]))
+      for (int v = 0; v < 3; ++v) glass_bounds_ = united(glass_bounds_, mesh.positions[mesh.triangles[i][v]]);
+  for (std::size_t i = opaque_.spheres; i < spheres.size(); ++i)
+    if (is_glass(spheres[i].material))
+      glass_bounds_ =
+          united(glass_bounds_, Spheres<float>{spheres.data(), 0, 0}.bounds(static_cast<std::uint32_t>(i)));
+  for (const Plane& plane : planes) glass_planes_ = glass_planes_ || is_glass(plane.material);
+
   positions_ = Buffer(stream, mesh.positions);
   triangles_ = Buffer(stream, mesh.triangles);
   normals_ = Buffer(stream, mesh.normals);
@@ -127,9 +137,12 @@ WhittedScene::WhittedScene(const Scene& scene, const WhittedSettings& settings, 
   stop_if_cancelled();
 
   for (const Light& light : scene.lights) {
-    const auto cosine = [](float degrees) { return static_cast<float>(std::cos(degrees * pi / 180)); };
+    const auto opening = [](float degrees) {  // 1 - cos, without its cancellation
+      const double half = std::sin(degrees * pi / 360);
+      return static_cast<float>(2 * half * half);
+    };
     host_lamps_.push_back({light.kind, light.position, light.direction, light.intensity, light.attenuation,
-                           light.range, cosine(light.inner_angle), cosine(light.outer_angle)});
+                           light.range, opening(light.inner_angle), opening(light.outer_angle)});
   }
   material_list_ = Buffer(stream, host_materials_);
   media_ = Buffer(stream, host_media_);
@@ -161,6 +174,11 @@ WhittedScene::WhittedScene(const Scene& scene, const WhittedSettings& settings, 
   view_.textures = textures_.view();
   view_.ambient = scene.ambient;
   view_.background = scene.environment.colour;
+}
+
+bool WhittedScene::may_be_in_glass(const vec3& point) const {
+  const Box with = united(glass_bounds_, point);
+  return glass_planes_ || (with.lower == glass_bounds_.lower && with.upper == glass_bounds_.upper);
 }
 
 }  // namespace trilha

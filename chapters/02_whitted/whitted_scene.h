@@ -22,6 +22,8 @@ class WhittedScene {
   const vec3* positions() const { return positions_.data(); }
   const uvec3* triangles() const { return triangles_.data(); }
   const Box& bounds() const { return bounds_; }
+  /// False where no glass body can be: most eyes are there, and need not ask.
+  bool may_be_in_glass(const vec3& point) const;
   /// Primitives that no light goes through come first; so many of each kind do.
   const PrimitiveCounts& opaque() const { return opaque_; }
 
@@ -34,7 +36,8 @@ class WhittedScene {
  private:
   ShadingView view_;
   unsigned features_;
-  Box bounds_;
+  Box bounds_, glass_bounds_;
+  bool glass_planes_ = false;
   PrimitiveCounts opaque_;
   Mesh mesh_;
   std::vector<WhittedMaterial> host_materials_;

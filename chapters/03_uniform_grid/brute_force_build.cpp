@@ -7,7 +7,7 @@ namespace {
 
 /// Calls found(number) for every triangle that touches cell c, ascending.
 template <class Found>
-TRILHA_HD void ask_all_triangles(const TriangleList& list, const CellFrame& frame, const ivec3& c,
+TRILHA_HD void ask_all_triangles(const TriangleArrays& list, const CellFrame& frame, const ivec3& c,
                                  const Found& found) {
   for (std::uint32_t i = 0; i < list.count; ++i) {
 #if !defined(__CUDA_ARCH__)
@@ -18,7 +18,7 @@ TRILHA_HD void ask_all_triangles(const TriangleList& list, const CellFrame& fram
 }
 
 struct CountTouching {
-  TriangleList list;
+  TriangleArrays list;
   CellFrame frame;
   GridView grid;
   std::uint32_t* counts;
@@ -31,7 +31,7 @@ struct CountTouching {
 };
 
 struct ListTouching {
-  TriangleList list;
+  TriangleArrays list;
   CellFrame frame;
   GridView grid;
   std::uint32_t* primitives;
@@ -45,12 +45,12 @@ struct ListTouching {
 
 }  // namespace
 
-void count_by_brute_force(const Stream& stream, const TriangleList& list, const CellFrame& frame,
+void count_by_brute_force(const Stream& stream, const TriangleArrays& list, const CellFrame& frame,
                           const GridView& grid, std::uint32_t* counts) {
   for_each(stream, grid.cell_count(), CountTouching{list, frame, grid, counts}, 1);
 }
 
-void fill_by_brute_force(const Stream& stream, const TriangleList& list, const CellFrame& frame,
+void fill_by_brute_force(const Stream& stream, const TriangleArrays& list, const CellFrame& frame,
                          const GridView& grid, std::uint32_t* primitives) {
   for_each(stream, grid.cell_count(), ListTouching{list, frame, grid, primitives}, 1);
 }

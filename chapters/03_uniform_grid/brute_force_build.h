@@ -7,11 +7,11 @@
 namespace trilha {
 
 /// Cell → how many triangles touch it.
-void count_by_brute_force(const Stream& stream, const TriangleList& list, const CellFrame& frame,
+void count_by_brute_force(const Stream& stream, const TriangleArrays& list, const CellFrame& frame,
                           const GridView& grid, std::uint32_t* counts);
 
 /// Cell → its list, ascending, where the grid's starts say.
-void fill_by_brute_force(const Stream& stream, const TriangleList& list, const CellFrame& frame,
+void fill_by_brute_force(const Stream& stream, const TriangleArrays& list, const CellFrame& frame,
                          const GridView& grid, std::uint32_t* primitives);
 
 }  // namespace trilha

@@ -8,7 +8,7 @@ namespace {
 
 /// Triangle → its box; empty, and counted, if no ray can hit it.
 struct TriangleBoxes {
-  TriangleList list;
+  TriangleArrays list;
   Box* boxes;
   std::uint32_t* left_out;
 
@@ -21,7 +21,7 @@ struct TriangleBoxes {
 
 }  // namespace
 
-Box bounds_of(const Stream& stream, const TriangleList& list, std::uint32_t& left_out) {
+Box bounds_of(const Stream& stream, const TriangleArrays& list, std::uint32_t& left_out) {
   Buffer<Box> boxes(stream.backend(), list.count);
   Buffer<std::uint32_t> others(stream.backend(), list.count);
   for_each(stream, list.count, TriangleBoxes{list, boxes.data(), others.data()});

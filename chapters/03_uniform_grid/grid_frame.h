@@ -30,14 +30,14 @@ TRILHA_HD inline bool can_be_hit(const vec3& a, const vec3& b, const vec3& c) {
 }
 
 /// Triangle i, seen from `origin`.
-TRILHA_HD inline TriangleCorners corners_of(const TriangleList& list, std::size_t i, const dvec3& origin) {
+TRILHA_HD inline TriangleCorners corners_of(const TriangleArrays& list, std::size_t i, const dvec3& origin) {
   const uvec3 t = list.triangles[i];
   const vec3 a = list.positions[t.x], b = list.positions[t.y], c = list.positions[t.z];
   return {dvec3(a) - origin, dvec3(b) - origin, dvec3(c) - origin, can_be_hit(a, b, c)};
 }
 
 /// The box of all triangles that a ray can hit, and how many others there are; a point where it can hit none.
-Box bounds_of(const Stream& stream, const TriangleList& list, std::uint32_t& left_out);
+Box bounds_of(const Stream& stream, const TriangleArrays& list, std::uint32_t& left_out);
 
 /// Cells of that resolution around the scene, wider by the margin: as builders see them, and as rays do.
 CellFrame frame_of(const Box& scene, const ivec3& resolution, GridView& view);

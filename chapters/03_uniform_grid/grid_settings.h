@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "chapters/01_ray_casting/structure.h"
 #include "common/math/box.h"
 #include "common/math/precision.h"
 
@@ -122,13 +123,6 @@ inline GridResolution resolve(const ResolutionSettings& settings, const dvec3& e
 }
 
 // ---- settings and statistics ---------------------------------------------------
-
-/// The triangles that a grid is built over. Pointers are to the backend.
-struct TriangleList {
-  const vec3* positions;
-  const uvec3* triangles;
-  std::uint32_t count;
-};
 
 /// Per object: each triangle goes to the cells of its box that it touches. Brute force: each cell asks every
 /// triangle. Both make the same cells, bit for bit (both after Ordeix & Cioli 2010, chapter 4).

@@ -7,7 +7,7 @@ namespace trilha {
 
 /// Triangle → how many cells its box has.
 struct BoxCells {
-  TriangleList list;
+  TriangleArrays list;
   CellFrame frame;
   std::uint64_t* counts;
 

@@ -12,7 +12,7 @@ namespace {
 
 /// Item → which of its cells the triangle touches, a bit each; and counts them in the cells.
 struct FindOverlaps {
-  TriangleList list;
+  TriangleArrays list;
   CellFrame frame;
   GridView grid;
   Runs runs;
@@ -56,7 +56,7 @@ struct FindOverlaps {
 /// Item → its triangle's number in the lists of the cells that it touches, each list filled from its end in
 /// the order in which threads come.
 struct FillLists {
-  TriangleList list;
+  TriangleArrays list;
   CellFrame frame;
   GridView grid;
   Runs runs;
@@ -79,7 +79,7 @@ struct FillLists {
 /// The builder per object, and what it keeps from one resolution that was too fine to the next.
 class PerObject {
  public:
-  PerObject(const Stream& stream, const TriangleList& list)
+  PerObject(const Stream& stream, const TriangleArrays& list)
       : stream_(stream), list_(list), box_cells_(stream.backend(), list.count) {}
 
   std::uint64_t box_cells(const CellFrame& frame) {
@@ -105,7 +105,7 @@ class PerObject {
 
  private:
   Stream stream_;
-  TriangleList list_;
+  TriangleArrays list_;
   Buffer<std::uint64_t> box_cells_;
   Buffer<std::uint32_t> further_, overlaps_;
   std::size_t items_ = 0;
@@ -113,7 +113,7 @@ class PerObject {
 
 }  // namespace
 
-Grid build_grid(const Stream& stream, const TriangleList& list, const GridSettings& settings) {
+Grid build_grid(const Stream& stream, const TriangleArrays& list, const GridSettings& settings) {
   Grid grid;
   GridStatistics& statistics = grid.statistics;
   if (list.count < 2) return grid;

@@ -208,6 +208,6 @@ struct Grid {
 /// Builds a grid of triangles on the stream's backend. Of fewer than two triangles it makes none: the view
 /// has no cells, and rays ask directly. The same goes where most_bytes does not hold a list of each triangle
 /// once. While it works it takes some 16 bytes a triangle and 4 a cell more. Throws Cancelled.
-Grid build_grid(const Stream& stream, const TriangleList& triangles, const GridSettings& settings);
+Grid build_grid(const Stream& stream, const TriangleArrays& triangles, const GridSettings& settings);
 
 }  // namespace trilha

@@ -382,7 +382,9 @@ CommandLine::CommandLine(Demo& demo, Settings& settings, Options& options)
   app.add_option("--time", options.seconds, "add samples until so many seconds have passed")
       ->type_name("SECONDS")
       ->excludes(samples);
-  app.add_option("--seed", options.seed, "of the random numbers [0]")->type_name("N");
+  app.add_option("--seed", options.seed, "of the random numbers [0]")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
   app.add_option("--threads", options.threads, "of the CPU backend [0: all]")->type_name("N");
   app.add_option("--eye", eye_, "where the camera is")->type_name("X,Y,Z");
   app.add_option("--target", target_, "what the camera looks at")->type_name("X,Y,Z");
@@ -409,6 +411,10 @@ CommandLine::CommandLine(Demo& demo, Settings& settings, Options& options)
       ->type_name("DIR");
   app.add_option("--report-budget", options.report_budget, "about how long they may take [600]")
       ->type_name("SECONDS");
+  app.add_option("--report-only", options.report_only, "these of the experiments, by name")
+      ->type_name("NAME,…")
+      ->expected(1, 99)
+      ->delimiter(',');
   app.add_option("--sweep", options.sweeps,
                  "time and error over a setting's values, for 1, 2, 4 … --samples; twice for two settings")
       ->type_name("NAME=A,B,…")
@@ -434,9 +440,9 @@ CommandLine::CommandLine(Demo& demo, Settings& settings, Options& options)
 /// Refuses flags that have no part in what the others ask for.
 void CommandLine::check_parts() const {
   const bool fixed_scenes = options_.stability || (!options_.report.empty() && options_.sweeps.empty());
-  static const std::set<std::string> have_a_part{"--backend", "--headless", "--seed",          "--threads",
-                                                 "--config",  "--report",   "--report-budget", "--stability",
-                                                 "--json",    "--quiet"};
+  static const std::set<std::string> have_a_part{
+      "--backend",       "--headless",    "--seed",      "--threads", "--config", "--report",
+      "--report-budget", "--report-only", "--stability", "--json",    "--quiet"};
   for (const CLI::Option* option : app_.get_options())
     if (fixed_scenes && option->count() > 0 && have_a_part.count(option->get_name()) == 0)
       throw UsageError(option->get_name() + " has no part in " +
@@ -494,6 +500,9 @@ void CommandLine::check() {
   require("--time", options_.seconds, 0.0, 1e6);
   require("--threads", options_.threads, 0, 1024);
   require("--report-budget", options_.report_budget, 1.0, 1e6);
+  if (!options_.report_only.empty() &&
+      (options_.report.empty() || !options_.sweeps.empty() || options_.stability))
+    throw UsageError("--report-only chooses among the experiments of --report; give it a folder");
   if (options_.sweeps.size() > 2) throw UsageError("--sweep: two settings at most");
   if (options_.stability && !options_.sweeps.empty())
     throw UsageError("--stability and --sweep are two runs; name one of them");

@@ -24,8 +24,9 @@ struct Options {
   int threads = 0;                      ///< 0: all
   std::optional<vec3> eye, target, up;  ///< override the scene's camera
   std::optional<float> field_of_view;
-  std::string report;          ///< the folder of a report; empty for none
-  double report_budget = 600;  ///< seconds
+  std::string report;                    ///< the folder of a report; empty for none
+  double report_budget = 600;            ///< seconds
+  std::vector<std::string> report_only;  ///< of its experiments, by name; empty: all
   std::vector<std::string> sweeps;
   bool stability = false;
   /// Said so, or asked for what only a file can answer: --output, --time, --json or --explain.

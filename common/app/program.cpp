@@ -174,8 +174,27 @@ void say_where(const Options& options, const std::string& what) {
     std::cout << what << " " << options.report << "\n";
 }
 
+/// Those that are named, in the report's order; all if none is.
+std::vector<Experiment> chosen(std::vector<Experiment> all, const std::vector<std::string>& names) {
+  if (names.empty()) return all;
+  for (const std::string& name : names) {
+    std::string known;
+    bool found = false;
+    for (const Experiment& experiment : all) {
+      found = found || experiment.name == name;
+      known += (known.empty() ? "" : ", ") + experiment.name;
+    }
+    if (!found) throw UsageError("--report-only: '" + name + "' is none of " + known);
+  }
+  std::erase_if(all, [&](const Experiment& experiment) {
+    return std::find(names.begin(), names.end(), experiment.name) == names.end();
+  });
+  return all;
+}
+
 void run_report(Demo& demo, const Settings& settings, const Options& options,
                 const std::function<std::unique_ptr<Demo>()>& make_demo) {
+  const std::vector<Experiment> experiments = chosen(demo.experiments(), options.report_only);
   if (!options.report.empty()) make_folder(options.report);
   Progress progress("measuring", 1, options.quiet || options.json);
   double shown = 0;
@@ -191,7 +210,7 @@ void run_report(Demo& demo, const Settings& settings, const Options& options,
   };
   Report report(how);
   if (options.sweeps.empty()) {
-    report.run(demo.experiments());
+    report.run(experiments);
   } else {
     std::vector<Sweep> sweeps;
     for (const std::string& text : options.sweeps) sweeps.push_back(Sweep::parse(text, settings));

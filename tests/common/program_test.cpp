@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "tests/program.h"
 #include "tests/testing.h"
@@ -89,6 +90,9 @@ TEST_CASE("what is refused is refused in one line, with its exit code, and nothi
       {"--report good.obj", 1, "good.obj"},
       {"--report /dev/null/report", 1, "/dev/null/report"},
       {"--report-budget 0", 1, "--report-budget"},
+      {"--seed -1", 2, "--seed"},
+      {"--report r --report-only samples,no-such", 2, "no-such"},
+      {"--report-only samples", 2, "--report"},
       {"--stability --scene good.obj", 2, "--scene"},
       {"--report r --test plane", 2, "--test"},
       {"--scene good.obj --sweep test=plane,plane", 2, "twice"},
@@ -266,6 +270,19 @@ TEST_CASE("a report keeps its budget and says what it left out") {
     CHECK(row["time_ms"]["median"] > 0);
   }
   CHECK(fs::exists(folder.path / "r" / "report.csv"));
+}
+
+// Catches: an experiment that was not asked for, one that was and is not there.
+TEST_CASE("a report of some experiments has these alone") {
+  Folder folder;
+  const Result result = run(folder, "--report {}/r --report-budget 2 --backend cpu --report-only samples");
+  INFO(result.err);
+  REQUIRE(result.code == 0);
+  const Json json = Json::parse(contents(folder.path / "r" / "report.json"));
+  std::set<std::string> measured;
+  for (const Json& row : json["rows"]) measured.insert(row["experiment"].get<std::string>());
+  for (const Json& said : json["left_out"]) measured.insert(said.get<std::string>().substr(0, 7));
+  CHECK(measured == std::set<std::string>{"samples"});
 }
 
 // Catches: a sweep that does not change the setting, that changes another, or whose error is not the
