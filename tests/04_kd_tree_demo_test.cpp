@@ -63,14 +63,14 @@ TEST_CASE("04: whatever the tree, the picture is the same, and what is visited i
       {"depth-factor", {"0", "0.5", "2"}, {{{"depth-base", "0"}}}, {no_structure, grid}},
       {"traversal",
        {"stack", "restart", "backtrack", "push-down", "short-stack", "packets"},
-       {{}, median, {{"depth-factor", "0"}, {"depth-base", "0"}, {"structure", "kd-tree"}}},
+       {{}, median, {{"clip", "false"}}},
        {no_structure, grid}},
       {"stack-places", {"1", "2", "4"}, {{{"traversal", "short-stack"}}}, {{}, no_structure, grid}}};
   check_structure_settings(make_kd_tree_demo, trials,
                            {rich_scene(), load_scene("sphereflake:level=1,subdivisions=2")});
 }
 
-// Catches: a structure of the clear or the opaque parts that is numbered from another triangle than theirs.
+// Catches: a tree over all triangles, or over those of a part alone, that misses what brute force meets.
 TEST_CASE("04: the pictures of the program's scenes are those of brute force") {
   for (const char* name : {"still_life", "dist", "cornell_box"}) {
     const Scene scene = load_scene(name);
@@ -108,21 +108,26 @@ TEST_CASE("04: heat maps count what the tree's probe counts") {
 // Catches: figures of a ray in the panel that are not those of its pixel in the heat maps; figures of the
 // tree that contradict each other.
 TEST_CASE("04: what is told of a pixel is what its heat maps show") {
-  const Scene scene = load_scene("sphereflake:level=1,subdivisions=2");
-  for (const Backend backend : backends())
-    for (const char* traversal : {"stack", "restart", "backtrack", "packets"}) {
-      StructureSubject subject(make_kd_tree_demo, {{"traversal", traversal}});
-      subject.demo->build(scene, backend);
-      const auto nodes = subject.heat(scene, "nodes", backend), tests = subject.heat(scene, "tests", backend);
-      for (int y = 0; y < demo_height; y += 2)
-        for (int x = 0; x < demo_width; ++x) {
-          INFO(traversal << " on " << name(backend) << ", pixel " << x << ", " << y);
-          const auto at = static_cast<std::size_t>(y * demo_width + x);
-          CHECK(fact(subject.demo->inspect(scene.camera, demo_width, demo_height, x, y), "visited, tested") ==
-                std::to_string(static_cast<int>(nodes[at].x)) + " nodes, " +
-                    std::to_string(static_cast<int>(tests[at].x)) + " triangles");
-        }
-    }
+  // of the second, what is opaque and what is clear lie in structures of their own, too
+  for (const Scene& scene : {load_scene("sphereflake:level=1,subdivisions=2"), rich_scene()})
+    for (const Backend backend : backends())
+      for (const char* traversal : {"stack", "restart", "backtrack", "packets"}) {
+        StructureSubject subject(make_kd_tree_demo, {{"traversal", traversal}});
+        subject.demo->build(scene, backend);
+        const int bodies = static_cast<int>(scene.spheres.size() + scene.planes.size());
+        const auto nodes = subject.heat(scene, "nodes", backend),
+                   tests = subject.heat(scene, "tests", backend);
+        for (int y = 0; y < demo_height; y += 2)
+          for (int x = 0; x < demo_width; ++x) {
+            INFO(traversal << " on " << name(backend) << ", pixel " << x << ", " << y);
+            const auto at = static_cast<std::size_t>(y * demo_width + x);
+            CHECK(fact(subject.demo->inspect(scene.camera, demo_width, demo_height, x, y),
+                       "visited, tested") == std::to_string(static_cast<int>(nodes[at].x)) + " nodes, " +
+                                                 std::to_string(static_cast<int>(tests[at].x) - bodies) +
+                                                 " triangles");
+          }
+      }
+  const Scene scene = rich_scene();
   StructureSubject subject(make_kd_tree_demo, {{"structure", "grid"}});
   subject.demo->build(scene, Backend::cpu);
   CHECK(fact(subject.demo->inspect(scene.camera, 9, 9, 4, 4), "tree").empty());
@@ -132,12 +137,12 @@ TEST_CASE("04: what is told of a pixel is what its heat maps show") {
 // has (n − 1)/2 planes, and those of its second level lie on either side of its root's.
 TEST_CASE("04: the lines over the image are the tree's planes, level by level") {
   const Scene scene = load_scene("sphereflake:level=1,subdivisions=2");
-  const Box box = bounds(scene);
+  const Box box = triangle_bounds(scene);
   const float slack = 1e-3f * largest(box.size());
   for (const Backend backend : backends())
     for (const char* rule : {"surface-area", "object-median", "spatial-median"}) {
       INFO(rule << " on " << name(backend));
-      StructureSubject subject(make_kd_tree_demo, {{"split-rule", rule}});
+      StructureSubject subject(make_kd_tree_demo, {{"split-rule", rule}, {"depth-base", "2"}});
       subject.demo->build(scene, backend);
       const std::string tree = fact(subject.demo->inspect(scene.camera, 9, 9, 4, 4), "tree");
       int nodes = 0, depth = 0;
@@ -191,7 +196,7 @@ TEST_CASE("04: of very many planes those drawn are spread over the scene") {
   StructureSubject subject(make_kd_tree_demo,
                            {{"split-rule", "spatial-median"}, {"leaf-size", "1"}, {"depth-base", "20"}});
   subject.demo->build(scene, Backend::cpu);
-  const Box box = bounds(scene);
+  const Box box = triangle_bounds(scene);
   std::size_t most = 0;
   for (int level = 0; level < subject.demo->overlay_levels(); ++level) {
     const std::vector<Box> rectangles = rectangles_of(subject.demo->overlay(level));
@@ -219,7 +224,7 @@ TEST_CASE("04: what the tree could not hold is told") {
   subject.demo->build(scene, Backend::cpu);
   const std::vector<std::string> told = subject.demo->remarks();
   REQUIRE(told.size() == 1);
-  CHECK(told[0].find("1 triangle") == 0);
+  CHECK(told[0].find("1 triangle with NaN") == 0);
 }
 
 // Catches: parents and boxes that are said to be left out and are built, or the reverse.
@@ -249,11 +254,11 @@ TEST_CASE("04: no extreme case has another answer than brute force") {
   check_structure_cases(kd_contenders());
 }
 
-// Catches: a judge who sees no mistakes, a row without its figures, or with those of another contender.
+// Catches: a row without its figures, or with those of another contender.
 TEST_CASE("04: trials tell times, what is visited, and mistakes") { check_trials(kd_contenders()); }
 
 // Catches: an experiment that has no rows and does not say so, runs far over its time, or plots what its rows
 // do not have.
 TEST_CASE("04: the report's rows and plots are complete in seconds") {
-  check_experiments(kd_tree_experiments(), {"traversals", "split_rules", "arena", "samples"}, 25);
+  check_experiments(kd_tree_experiments(), {"traversals", "split_rules", "arena", "samples"}, 12);
 }

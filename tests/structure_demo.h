@@ -53,7 +53,9 @@ struct StructureSubject {
   std::vector<vec3> sample(const Scene& scene, const Stream& stream = Backend::cpu, int width = demo_width,
                            int height = demo_height) {
     Film film(stream, width, height);
-    REQUIRE(demo->add_sample(film, {scene.camera, 0, false, 3, 1000, [](double) { return true; }}));
+    const bool whole =  // on its own: Cancelled is no failure
+        demo->add_sample(film, {scene.camera, 0, false, 3, 1000, [](double) { return true; }});
+    REQUIRE(whole);
     return film.image(stream).pixels;
   }
   std::vector<vec3> picture(const Scene& scene, const Stream& stream = Backend::cpu) {
@@ -129,6 +131,15 @@ inline void check_structure_settings(MakeDemo make, const std::vector<SettingTri
         }
     }
   }
+}
+
+/// Of the scene's triangles as they stand in the world.
+inline Box triangle_bounds(const Scene& scene) {
+  const Mesh mesh = flattened(scene, MeshParts{});
+  Box box;
+  for (const uvec3& t : mesh.triangles)
+    for (const std::uint32_t corner : {t.x, t.y, t.z}) box = united(box, mesh.positions[corner]);
+  return box;
 }
 
 /// Rays through the centres of a picture's pixels, as the demo sends them without antialiasing.
@@ -272,26 +283,28 @@ inline void check_cancelled(MakeDemo make, const Flags& flags) {
 
 // ---- trials --------------------------------------------------------------------
 
-/// Brute force that misses every seventh ray: a structure that is wrong. For the CPU.
+/// A structure that misses every seventh ray: one that is wrong. For the CPU.
 class LosesHits final : public TriangleStructure {
  public:
-  explicit LosesHits(std::unique_ptr<TriangleStructure> sound) : sound_(std::move(sound)) {}
+  LosesHits(std::unique_ptr<TriangleStructure> sound, bool of_closest, bool of_occluded)
+      : sound_(std::move(sound)), of_closest_(of_closest), of_occluded_(of_occluded) {}
   void closest(const Ray* rays, Hit* hits, std::size_t n) const override {
     sound_->closest(rays, hits, n);
-    for (std::size_t i = 6; i < n; i += 7) hits[i] = Hit{rays[i].t_max};
+    for (std::size_t i = 6; of_closest_ && i < n; i += 7) hits[i] = Hit{rays[i].t_max};
   }
   void occluded(const Ray* rays, std::uint8_t* occluded, std::size_t n) const override {
     sound_->occluded(rays, occluded, n);
-    for (std::size_t i = 6; i < n; i += 7) occluded[i] = 0;
+    for (std::size_t i = 6; of_occluded_ && i < n; i += 7) occluded[i] = 0;
   }
   void probe(const Ray* rays, Probe* probes, std::size_t n) const override { sound_->probe(rays, probes, n); }
 
  private:
   std::unique_ptr<TriangleStructure> sound_;
+  bool of_closest_, of_occluded_;
 };
 inline Contender losing(const MakeStructure& sound) {
   return {"loses hits", {}, [sound](const Stream& stream, const TriangleArrays& triangles) {
-            return std::make_unique<LosesHits>(sound(stream, triangles));
+            return std::make_unique<LosesHits>(sound(stream, triangles), true, true);
           }};
 }
 
@@ -323,6 +336,31 @@ inline double value(const Row& row, const std::string& kind) {
     if (e.kind == kind) return e.value.value;
   FAIL(row.experiment << ", " << row.technique << " has no error " << kind);
   return 0;
+}
+
+/// The judge counts just the answers that are wrong, of either question, among just the rays that it may ask.
+inline void check_judge(const MakeStructure& make) {
+  const Scene scene = load_scene("sphereflake:level=1,subdivisions=2");
+  const TrialScene trial(scene, Backend::cpu, make, demo_width, demo_height, 5);
+  const Buffer<Ray>& rays = trial.rays(RayKind::primary);
+  std::vector<Hit> hits(rays.size());
+  make(Backend::cpu, trial.triangles())->closest(rays.data(), hits.data(), hits.size());
+  std::size_t lost = 0;
+  for (std::size_t i = 6; i < hits.size(); i += 7) lost += hits[i].found();
+  REQUIRE(lost > 20);
+  const Judge judge(Backend::cpu, trial.triangles(), rays, rays.size()),
+      brief(Backend::cpu, trial.triangles(), rays, 100);
+  for (const bool of_closest : {false, true})
+    for (const bool of_occluded : {false, true}) {
+      const LosesHits structure(make(Backend::cpu, trial.triangles()), of_closest, of_occluded);
+      const Mismatches all = judge.mismatches(structure), some = brief.mismatches(structure);
+      CHECK(all.of == rays.size());
+      CHECK(all.closest == (of_closest ? lost : 0));
+      CHECK(all.occluded == (of_occluded ? lost : 0));
+      CHECK(some.of == 100);
+      CHECK((some.closest > 0) == of_closest);
+      CHECK((some.occluded > 0) == of_occluded);
+    }
 }
 
 /// A contender's rows are complete and say what its structure's probe says; those of one that loses hits say

@@ -218,7 +218,7 @@ Display WhittedDemo::display() const {
     display.most = 64;
     display.counted = "rays of a tree";
   } else if (shows_structure(settings_.show)) {
-    display.most = 64;
+    display.most = settings_.show == Show::visited ? most_visited() : 64;
     display.counted = settings_.show == Show::visited ? visited() + " visited" : "triangles tested";
   } else {
     // a pixel's own corner, and five for every quartering

@@ -32,11 +32,13 @@ class WhittedDemo : public Demo {
   std::vector<StabilityCase> extreme_cases() const override;
 
  protected:
-  /// Makes the structure that the settings ask for: for the picture, or on the host, to look into. None: brute
-  /// force.
+  /// Makes the structure that the settings ask for: for the picture, or on the host, to look into. None:
+  /// brute force.
   virtual MakeStructure structure(bool /*on_host*/) { return {}; }
   /// What a ray visits in it: "cells", "nodes"; "": there is no structure.
   virtual std::string visited() const { return ""; }
+  /// Where the heat map of that ends.
+  virtual float most_visited() const { return 64; }
 
   const Scene* scene() const { return scene_; }  ///< that was built last
   WhittedSettings settings_;

@@ -54,18 +54,20 @@ void measure_resolution(Report& report) {
           UniformGridSettings settings = with(traversal);
           settings.grid.resolution.rule = ResolutionRule::short_axis;
           settings.grid.resolution.factor = static_cast<float>(factor);
-          contenders.push_back(
-              {name(traversal),
-               {{"short_axis", std::round(factor * n)}, {"factor", factor}, {"theirs", false}},
-               uniform_grid(settings)});
+          contenders.push_back({name(traversal),
+                                {{"short_axis", std::round(factor * n)},
+                                 {"factor", factor},
+                                 {"chosen", std::string("by factor")}},
+                                uniform_grid(settings)});
         }
       for (const GridTraversal traversal : all_grid_traversals) {  // and theirs
         UniformGridSettings settings = with(traversal);
         settings.grid.resolution.rule = ResolutionRule::by_hand;
         settings.grid.resolution.by_hand = ivec3(static_cast<int>(one.best));
-        contenders.push_back({name(traversal),
-                              {{"short_axis", one.best}, {"factor", one.best / n}, {"theirs", true}},
-                              uniform_grid(settings)});
+        contenders.push_back(
+            {name(traversal),
+             {{"short_axis", one.best}, {"factor", one.best / n}, {"chosen", std::string("as published")}},
+             uniform_grid(settings)});
       }
       try_contenders(report, trial, contenders, 1 / left--,
                      [&](Row& row, const TriangleStructure& structure) {
@@ -188,7 +190,7 @@ std::vector<Experiment> uniform_grid_experiments() {
                           {"backend", "settings.rays"},
                           {"scene"},
                           {"technique"},
-                          {"settings.theirs"},
+                          {"settings.chosen"},
                           false},
                          {"resolution_build",
                           "What a grid takes to build",

@@ -137,11 +137,12 @@ class KdTreeDemo final : public WhittedDemo {
     if (tree_ == nullptr) return list;
     const BuiltKdTree& tree = tree_->tree();
     if (tree.leaves_by_references > 0)
-      list.push_back(std::to_string(tree.leaves_by_references) +
-                     " leaves were not split further: the tree's references had come to their limit");
+      list.push_back(
+          counted(tree.leaves_by_references, "place") +
+          " of the tree not split further: its share of the references that there may be was used up");
     if (tree.not_finite > 0)
-      list.push_back(std::to_string(tree.not_finite) +
-                     " triangles with NaN or infinity are not in the tree: nothing can hit them");
+      list.push_back(counted(tree.not_finite, "triangle") +
+                     " with NaN or infinity left out of the tree: nothing can hit them");
     return list;
   }
 
@@ -179,6 +180,7 @@ class KdTreeDemo final : public WhittedDemo {
     };
   }
   std::string visited() const override { return structure_ == Structure::grid ? "cells" : "nodes"; }
+  float most_visited() const override { return structure_ == Structure::grid ? 64.0f : 128.0f; }
 
  private:
   enum class Structure { brute_force, grid, kd_tree };

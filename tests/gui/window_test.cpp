@@ -4,6 +4,8 @@
 #include <random>
 
 #include "chapters/02_whitted/demo.h"
+#include "chapters/03_uniform_grid/demo.h"
+#include "chapters/04_kd_tree/demo.h"
 #include "common/image/files.h"
 #include "common/math/statistics.h"
 #include "tests/gui/driver.h"
@@ -212,6 +214,38 @@ TEST_CASE("chapter 02: every widget over its range, and every term live") {
   }
   driver.click("button Reset all");
   for (const Setting& setting : driver.session().side(0).settings.all()) CHECK_FALSE(setting.changed());
+}
+
+// Catches: a setting of a structure that no widget can hold; lines over the image that are not drawn, or stay
+// when they are put away; a heat map that shows the picture.
+TEST_CASE("chapters 03 and 04: every widget of the structure over its range, and its lines") {
+  for (const auto make : {make_uniform_grid_demo, make_kd_tree_demo}) {
+    Driver driver({"--scene", "sphereflake:level=1,subdivisions=1", "--backend", "cpu", "--window-size",
+                   "640x2000", "--antialiasing", "none", "--depth", "1"},
+                  make);
+    INFO(driver.session().side(0).demo->name().first);
+    const auto shown = [&] {
+      driver.move(10, 1900);
+      REQUIRE(driver.until_complete());
+      driver.frames(4);
+      Image area = driver.image_area();
+      area.pixels.erase(area.pixels.begin(), area.pixels.begin() + area.pixels.size() / 4);
+      return area.pixels;
+    };
+    const auto picture = shown();
+    for (const int level : {0, -1}) {
+      driver.session().set_overlay_level(level);
+      REQUIRE(driver.until([&] { return driver.session().renderer().overlay().empty() == (level < 0); }));
+      CHECK((shown() == picture) == (level < 0));
+    }
+    driver.session().set(0, "show", "tests");
+    CHECK((shown() != picture));
+    driver.session().set(0, "show", "picture");
+    driver.session().set(0, "structure", "brute-force");
+    CHECK((shown() == picture));
+    driver.click("button Reset all");
+    drive_settings(driver, 0);
+  }
 }
 
 // Catches: a widget beside the chapter's settings that does nothing, changes another thing, or leaves its
