@@ -1,9 +1,20 @@
 #pragma once
 // How the cells of all triangles' boxes are shared out among threads.
 
-#include "chapters/03_uniform_grid/uniform_grid.h"
+#include "chapters/03_uniform_grid/triangle_box.h"
 
 namespace trilha {
+
+/// Triangle → how many cells its box has.
+struct BoxCells {
+  TriangleArrays list;
+  CellFrame frame;
+  std::uint64_t* counts;
+
+  TRILHA_HD void operator()(std::size_t i) const {
+    counts[i] = CellRange::of(corners_of(list, i, frame.lower), frame).count();
+  }
+};
 
 /// A thread looks at no more than `run` cells of a triangle's box, so that a large triangle does not keep one
 /// of them busy while the others wait. Item i < count is the first run of triangle i; then come the further

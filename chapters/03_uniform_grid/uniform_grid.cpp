@@ -10,17 +10,6 @@
 namespace trilha {
 namespace {
 
-/// Triangle → how many cells its box has.
-struct BoxCells {
-  TriangleArrays list;
-  CellFrame frame;
-  std::uint64_t* counts;
-
-  TRILHA_HD void operator()(std::size_t i) const {
-    counts[i] = CellRange::of(corners_of(list, i, frame.lower), frame).count();
-  }
-};
-
 /// Item → which of its cells the triangle touches, a bit each; and counts them in the cells.
 struct FindOverlaps {
   TriangleArrays list;
