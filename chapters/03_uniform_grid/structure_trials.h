@@ -69,9 +69,10 @@ class Judge {
 };
 
 /// Builds the contenders (the median of up to five builds), lets them take turns at the rays of each kind,
-/// and adds a row for each: time, cells or nodes and triangles a ray, mismatches with brute force among as
-/// many rays as make 10⁹ tests (10¹¹ on a device). `part` of the experiment's time may pass. `finish` may add
-/// to a row what is known of its structure.
+/// and adds a row for each: time, cells or nodes and triangles of all rays (of shadow rays, too, those that
+/// the nearest hit takes, not any), mismatches with brute force among as many rays as make 10⁹ tests (10¹¹ on
+/// a device). `part` of the experiment's time may pass. `finish` may add to a row what is known of its
+/// structure.
 using FinishRow = std::function<void(Row& row, const TriangleStructure& structure)>;
 void try_contenders(Report& report, const TrialScene& scene, const std::vector<Contender>& contenders,
                     double part, const FinishRow& finish = {});

@@ -58,11 +58,14 @@ void bare(Driver& driver) {
   driver.move(driver.interface().image_area().width + 5, 5);
 }
 
-/// Moves each widget of a side's settings, as they are active at the time, over its range.
-void drive_settings(Driver& driver, int side) {
+/// Moves each widget of a side's settings, or of a group of them, as they are active at the time, over its
+/// range.
+void drive_settings(Driver& driver, int side, const std::string& group = "") {
   const std::string letter = side == 0 ? "A" : "B";
   std::vector<std::string> names;
-  for (const Setting& setting : driver.session().side(side).settings.all()) names.push_back(setting.name);
+  for (const Setting& setting : driver.session().side(side).settings.all())
+    if (group.empty() || setting.group == group) names.push_back(setting.name);
+  REQUIRE_FALSE(names.empty());
   for (const std::string& name : names) {
     const Setting& setting = driver.session().side(side).settings[name];
     const std::string widget = "setting " + letter + " " + name;
@@ -244,7 +247,7 @@ TEST_CASE("chapters 03 and 04: every widget of the structure over its range, and
     driver.session().set(0, "structure", "brute-force");
     CHECK((shown() == picture));
     driver.click("button Reset all");
-    drive_settings(driver, 0);
+    drive_settings(driver, 0, "Structure");
   }
 }
 
