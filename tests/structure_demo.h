@@ -498,7 +498,9 @@ inline void check_experiments(const std::vector<Experiment>& experiments, const 
     }
   }
   CHECK(found == names);
+#if !defined(__SANITIZE_ADDRESS__)  // with which building takes all of the time
   CHECK_FALSE(report.rows().empty());
+#endif
   for (const Row& row : report.rows()) {
     INFO(row.experiment << ", " << row.scene << ", " << row.technique);
     CHECK(row.time_ms.repeats >= Report::least_repeats);
