@@ -4,6 +4,7 @@
 
 #include "chapters/03_uniform_grid/experiments.h"
 #include "chapters/03_uniform_grid/grid_structure.h"
+#include "common/scene/flatten.h"
 #include "tests/structure_demo.h"
 
 using namespace trilha;
@@ -387,4 +388,49 @@ TEST_CASE("03: trials tell times, what is visited, and mistakes") { check_trials
 // do not have.
 TEST_CASE("03: the report's rows and plots are complete in seconds") {
   check_experiments(uniform_grid_experiments(), {"resolution", "samples", "versions"}, 20);
+}
+
+// Catches: a scene of triangles that no ray can hit, which asks all of them of every ray.
+TEST_CASE("03: where nothing can be hit, nothing is asked") {
+  for (const Backend backend : backends()) {
+    const Stream stream(backend);
+    const Buffer<vec3> positions(stream, std::vector<vec3>(3, vec3(1)));
+    const Buffer<uvec3> triangles(stream, std::vector<uvec3>(1000, uvec3(0, 1, 2)));
+    const auto grid = uniform_grid({})(stream, {positions.data(), triangles.data(), 1000});
+    Ray ray;
+    ray.origin = {1, 1, -4};
+    const Buffer<Ray> rays(stream, {ray});
+    Buffer<Hit> hits(backend, 1);
+    Buffer<Probe> probes(backend, 1);
+    grid->closest(rays.data(), hits.data(), 1);
+    grid->probe(rays.data(), probes.data(), 1);
+    CHECK_FALSE(hits.to_vector(stream)[0].found());
+    CHECK(probes.to_vector(stream)[0].primitives_tested == 0);
+  }
+}
+
+// Catches: a limit on memory that leaves out what skipping empty space keeps for each cell.
+TEST_CASE("03: the limit on memory holds for all that stays") {
+  const Scene scene = load_scene("dist");
+  const Mesh mesh = flattened(scene, MeshParts{});
+  for (const Backend backend : backends())
+    for (const GridTraversal traversal : all_grid_traversals)
+      for (const std::size_t most : {std::size_t{1} << 17, std::size_t{1} << 19, std::size_t{1} << 21}) {
+        INFO(name(backend) << ", " << name(traversal) << ", " << most);
+        const Stream stream(backend);
+        const Buffer positions(stream, mesh.positions);
+        const Buffer triangles(stream, mesh.triangles);
+        UniformGridSettings settings;
+        settings.traversal = traversal;
+        settings.grid.most_bytes = most;
+        settings.grid.resolution.density = 1000;
+        const std::size_t count = mesh.triangles.size();
+        const auto before = live_bytes(backend);
+        const GridStructure grid(
+            stream, {positions.data(), triangles.data(), static_cast<std::uint32_t>(count)}, settings);
+        CHECK(grid.grid().view.cell_count() > 64);
+        CHECK(live_bytes(backend) - before - count * Watertight::numbers * sizeof(float) <= most);
+        CHECK(grid.grid().statistics.bytes <= most);
+        CHECK(grid.grid().statistics.resolution.lowered != 0);
+      }
 }

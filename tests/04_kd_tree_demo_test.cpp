@@ -262,3 +262,31 @@ TEST_CASE("04: trials tell times, what is visited, and mistakes") { check_trials
 TEST_CASE("04: the report's rows and plots are complete in seconds") {
   check_experiments(kd_tree_experiments(), {"traversals", "split_rules", "arena", "samples"}, 20);
 }
+
+// Catches: a short stack that is longer than its room, or has none.
+TEST_CASE("04: a short stack has as many places as there is room for") {
+  const Buffer<vec3> positions(Backend::cpu, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  const Buffer<uvec3> triangles(Backend::cpu, std::vector<uvec3>(9, uvec3(0, 1, 2)));
+  const Buffer<Ray> rays(Backend::cpu, std::vector<Ray>(1));
+  Buffer<Hit> hits(Backend::cpu, 1);
+  for (const int places : {-1, 0, 1, KdShortStackWalk::most_places, KdShortStackWalk::most_places + 1}) {
+    KdSettings settings;
+    settings.traversal = KdTraversal::short_stack;
+    settings.places = places;
+    const auto tree = kd_tree(settings)(Backend::cpu, {positions.data(), triangles.data(), 9});
+    if (places >= 1 && places <= KdShortStackWalk::most_places)
+      CHECK_NOTHROW(tree->closest(rays.data(), hits.data(), 1));
+    else
+      CHECK_THROWS_AS(tree->closest(rays.data(), hits.data(), 1), std::invalid_argument);
+  }
+}
+
+// Catches: a depth that is asked for and cut off without a word.
+TEST_CASE("04: a tree that may not be as deep as asked says so") {
+  StructureSubject subject(make_kd_tree_demo, {{"depth-base", "40"}, {"depth-factor", "4"}});
+  const Scene scene = load_scene("dist");
+  subject.picture(scene);
+  const auto remarks = subject.demo->remarks();
+  CHECK(std::any_of(remarks.begin(), remarks.end(),
+                    [](const std::string& remark) { return remark.find("52 deep") != std::string::npos; }));
+}

@@ -273,6 +273,9 @@ inline void check_cancelled(MakeDemo make, const Flags& flags) {
       subject.demo->inspect(scene.camera, 9, 9, 4, 4);
     });
     other.join();
+    for (int level = 0; level < subject.demo->overlay_levels(); ++level)  // of what is there, if anything is
+      subject.demo->overlay(level);
+    subject.demo->remarks();
     REQUIRE((subject.picture(scene) == expected));
     CHECK(subject.demo->overlay(0).size() == lines);
     CHECK_FALSE(subject.demo->inspect(scene.camera, 9, 9, 4, 4).facts.empty());

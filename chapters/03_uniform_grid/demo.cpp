@@ -63,7 +63,8 @@ class UniformGridDemo final : public WhittedDemo {
         .only_if(by(ResolutionRule::density), "only with --structure grid and --resolution density");
     settings
         .integer("grid-megabytes", most_megabytes_, 1, 16384, Effect::rebuild,
-                 "the most that a grid may take; what would take more gets fewer cells, and that is said")
+                 "the most that a grid may take (of glass or alpha, there are three); what would take more "
+                 "gets fewer cells, and that is said")
         .only_if(with_grid, "only with --structure grid");
     settings.group("Structure", "The way of a ray");
     settings
@@ -75,6 +76,12 @@ class UniformGridDemo final : public WhittedDemo {
                 Effect::rebuild, "how a ray goes through the cells; the hits are the same")
         .only_if(with_grid, "only with --structure grid");
     WhittedDemo::declare_settings(settings);
+  }
+
+  void build(const Scene& scene, const Stream& stream) override {
+    grid_ = host_grid_ = made_ = nullptr;  // a build may be cancelled
+    WhittedDemo::build(scene, stream);
+    grid_ = made_;
   }
 
   Inspection inspect(const Camera& camera, int width, int height, int x, int y) override {
@@ -155,7 +162,7 @@ class UniformGridDemo final : public WhittedDemo {
 
  protected:
   MakeStructure structure(bool on_host) override {
-    const GridStructure*& kept = on_host ? host_grid_ : grid_;
+    const GridStructure*& kept = on_host ? host_grid_ : made_;
     kept = nullptr;
     if (structure_ == Structure::brute_force) return {};
     UniformGridSettings settings = grid_settings_;
@@ -215,6 +222,7 @@ class UniformGridDemo final : public WhittedDemo {
   Structure structure_ = Structure::grid;
   UniformGridSettings grid_settings_;
   int most_megabytes_ = 512;
+  const GridStructure* made_ = nullptr;       ///< by the build that is under way
   const GridStructure* grid_ = nullptr;       ///< of the picture
   const GridStructure* host_grid_ = nullptr;  ///< to look into
 };

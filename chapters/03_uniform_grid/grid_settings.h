@@ -40,9 +40,10 @@ struct GridResolution {
   unsigned lowered = 0;  ///< lowered_for
 };
 
-/// Cells of all triangles' boxes that a builder looks at: 64 a triangle, but 2²⁶ in any case.
+/// Cells of all triangles' boxes that a builder looks at: 64 a triangle, but 2²⁶ in any case; and fewer than
+/// 2³², so that lists, which have no more entries, are numbered with 32 bits.
 inline std::uint64_t most_box_cells(std::uint32_t triangles) {
-  return std::uint64_t{64} * triangles + (std::uint64_t{1} << 26);
+  return std::min<std::uint64_t>(std::uint64_t{64} * triangles + (std::uint64_t{1} << 26), 0xffffffff);
 }
 
 /// What a grid promises for rays from this many sizes of the scene away; those from further away take longer.
@@ -132,6 +133,7 @@ struct GridSettings {
   ResolutionSettings resolution;
   GridBuilder builder = GridBuilder::per_object;
   std::size_t most_bytes = std::size_t{1} << 29;  ///< of the finished grid; the resolution is lowered to fit
+  std::size_t more_a_cell = 0;  ///< bytes that something else keeps for each cell, and that count as well
   /// The longest list that one thread sorts; 0: what suits the backend.
   std::uint32_t longest_alone = 0;
 };

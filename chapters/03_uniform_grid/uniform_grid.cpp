@@ -127,7 +127,9 @@ Grid build_grid(const Stream& stream, const TriangleArrays& list, const GridSett
   const dvec3 extent = dvec3(scene.upper) - dvec3(scene.lower);
   lap(statistics.times.bounds);
   GridResolution& resolution = statistics.resolution;
-  resolution = resolve(settings.resolution, extent, list.count, settings.most_bytes);
+  constexpr std::size_t number = sizeof(std::uint32_t);
+  resolution = resolve(settings.resolution, extent, list.count,
+                       settings.most_bytes / (number + settings.more_a_cell) * number);
   PerObject per_object(stream, list);
   Buffer<std::uint32_t> counts;
   for (double share = 1;;) {
@@ -137,6 +139,7 @@ Grid build_grid(const Stream& stream, const TriangleArrays& list, const GridSett
     resolution.given = grid.view.resolution;
     if (share < 1 && cells_of(resolution.given) >= before) {  // there are no fewer
       resolution.given = ivec3(0), resolution.lowered |= lowered_for::no_grid;
+      statistics.references = statistics.box_cells = statistics.longest = 0, statistics.bytes = 0;
       return {GridView{}, statistics, {}, {}};
     }
     statistics.box_cells = per_object.box_cells(frame);
@@ -156,7 +159,7 @@ Grid build_grid(const Stream& stream, const TriangleArrays& list, const GridSett
     lap(statistics.times.overlap);
     statistics.references = reduce(stream, counts.data(), cells, std::uint32_t{0}, Sum{});
     statistics.longest = reduce(stream, counts.data(), cells, std::uint32_t{0}, Maximum{});
-    statistics.bytes = (cells + 1 + statistics.references) * sizeof(std::uint32_t);
+    statistics.bytes = (cells + 1 + statistics.references) * number + cells * settings.more_a_cell;
     if (statistics.bytes > settings.most_bytes) {
       share = std::min(0.9, std::sqrt(double(settings.most_bytes) / double(statistics.bytes)));
       resolution.lowered |= lowered_for::references;

@@ -1,6 +1,7 @@
 #include "chapters/04_kd_tree/demo.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "chapters/02_whitted/demo.h"
 #include "chapters/03_uniform_grid/grid_structure.h"
@@ -89,6 +90,12 @@ class KdTreeDemo final : public WhittedDemo {
     WhittedDemo::declare_settings(settings);
   }
 
+  void build(const Scene& scene, const Stream& stream) override {
+    tree_ = host_tree_ = made_ = nullptr;  // a build may be cancelled
+    WhittedDemo::build(scene, stream);
+    tree_ = made_;
+  }
+
   Inspection inspect(const Camera& camera, int width, int height, int x, int y) override {
     Inspection seen = WhittedDemo::inspect(camera, width, height, x, y);
     if (host_tree_ == nullptr) return seen;
@@ -110,8 +117,7 @@ class KdTreeDemo final : public WhittedDemo {
   }
 
   int overlay_levels() const override {
-    return tree_ != nullptr && tree_->tree().nodes.data() != nullptr ? std::min(tree_->statistics().depth, 20)
-                                                                     : 0;
+    return tree_ != nullptr && tree_->tree().nodes.data() != nullptr ? tree_->statistics().depth : 0;
   }
   std::vector<Line> overlay(int level) const override {
     std::vector<Line> lines;
@@ -136,6 +142,11 @@ class KdTreeDemo final : public WhittedDemo {
     std::vector<std::string> list = WhittedDemo::remarks();
     if (tree_ == nullptr) return list;
     const BuiltKdTree& tree = tree_->tree();
+    const double asked =
+        depth_base_ + depth_factor_ * std::log2(std::max<double>(double(scene()->triangle_count()), 1));
+    if (asked >= kd_most_depth + 1)
+      list.push_back("the tree may be " + std::to_string(kd_most_depth) + " deep, not " + shown(asked, 3) +
+                     ": a stack has that many places");
     if (tree.leaves_by_references > 0)
       list.push_back(
           counted(tree.leaves_by_references, "place") +
@@ -161,7 +172,7 @@ class KdTreeDemo final : public WhittedDemo {
 
  protected:
   MakeStructure structure(bool on_host) override {
-    const KdStructure*& kept = on_host ? host_tree_ : tree_;
+    const KdStructure*& kept = on_host ? host_tree_ : made_;
     kept = nullptr;
     if (structure_ == Structure::brute_force) return {};
     if (structure_ == Structure::grid) return uniform_grid({});
@@ -190,6 +201,7 @@ class KdTreeDemo final : public WhittedDemo {
   float traversal_cost_ = 15, intersection_cost_ = 20, empty_bonus_ = 0.2f, depth_base_ = 8,
         depth_factor_ = 1.3f;
   int leaf_size_ = 4;
+  const KdStructure* made_ = nullptr;       ///< by the build that is under way
   const KdStructure* tree_ = nullptr;       ///< of the picture
   const KdStructure* host_tree_ = nullptr;  ///< to look into
 };

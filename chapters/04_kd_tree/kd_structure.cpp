@@ -29,20 +29,28 @@ KdStructure::KdStructure(const Stream& stream, const TriangleArrays& triangles, 
       places_(settings.places),
       count_(triangles.count),
       numbers_(prepare_triangles<Watertight, float>(stream, Loop::plain, triangles.positions,
-                                                    triangles.triangles, triangles.count)) {
+                                                    triangles.triangles, triangles.count)),
+      settings_(settings.tree) {
   const bool climbs = settings.traversal == KdTraversal::backtrack || settings.keep_links;
   if (stream.backend() == Backend::cpu) {
     tree_ = build_kd_tree(triangles.positions, triangles.triangles, triangles.count, settings.tree);
-    statistics_ = trilha::statistics(tree_, triangles.count, settings.tree);
     if (climbs) links_ = make_links(stream, tree_);
     return;
   }
   const HostTriangles host = on_host(stream, triangles);
   const BuiltKdTree built =
       build_kd_tree(host.positions.data(), host.triangles.data(), triangles.count, settings.tree);
-  statistics_ = trilha::statistics(built, triangles.count, settings.tree);
   if (climbs) links_ = make_links(stream, built);
   tree_ = built.to(stream.backend(), stream);
+}
+
+const KdTreeStatistics& KdStructure::statistics() const {
+  if (!statistics_) {
+    const bool here = stream_.backend() == Backend::cpu;
+    const BuiltKdTree copied = here ? BuiltKdTree{} : tree_.to(Backend::cpu, stream_);
+    statistics_ = trilha::statistics(here ? tree_ : copied, count_, settings_);
+  }
+  return *statistics_;
 }
 
 void KdStructure::closest(const Ray* rays, Hit* hits, std::size_t n) const {

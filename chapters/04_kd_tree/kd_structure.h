@@ -1,6 +1,8 @@
 #pragma once
 // The kd-tree as casters and tracers see it.
 
+#include <optional>
+
 #include "chapters/01_ray_casting/structure.h"
 #include "chapters/04_kd_tree/statistics.h"
 #include "chapters/04_kd_tree/traversals.h"
@@ -25,7 +27,8 @@ class KdStructure final : public TriangleStructure {
 
   const BuiltKdTree& tree() const { return tree_; }
   const Stream& stream() const { return stream_; }
-  const KdTreeStatistics& statistics() const { return statistics_; }
+  /// Worked out when it is asked for first: no part of a build.
+  const KdTreeStatistics& statistics() const;
   std::size_t link_bytes() const { return links_.bytes(); }
 
  private:
@@ -40,7 +43,8 @@ class KdStructure final : public TriangleStructure {
   std::uint32_t count_;
   Buffer<float> numbers_;
   BuiltKdTree tree_;
-  KdTreeStatistics statistics_;
+  KdTreeSettings settings_;
+  mutable std::optional<KdTreeStatistics> statistics_;
   KdLinks links_;
 };
 

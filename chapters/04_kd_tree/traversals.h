@@ -1,6 +1,8 @@
 #pragma once
 // All ways to walk a kd-tree, to choose from.
 
+#include <stdexcept>
+
 #include "chapters/04_kd_tree/backtrack.h"
 #include "chapters/04_kd_tree/packets.h"
 #include "chapters/04_kd_tree/push_down.h"
@@ -31,6 +33,8 @@ struct KdTraced {
 /// own for one ray, and give that of the stack.
 template <class Primitives, class Function>
 decltype(auto) with_kd_walk(const KdTraced& traced, const Primitives& primitives, const Function& function) {
+  if (traced.places < 1 || traced.places > KdShortStackWalk::most_places)
+    throw std::invalid_argument("a short stack has 1 to 16 places");
   switch (traced.traversal) {
     case KdTraversal::restart:
       return function(KdTree<Primitives, KdRestartWalk>{traced.tree, primitives, {}});
