@@ -434,3 +434,8 @@ TEST_CASE("03: the limit on memory holds for all that stays") {
         CHECK(grid.grid().statistics.resolution.lowered != 0);
       }
 }
+
+// Catches: a walk that begins behind the place where the test found a triangle, or ends before it.
+TEST_CASE("03: rays that start at edges and graze have the hits of brute force") {
+  check_edge_starts(uniform_grid({}));
+}

@@ -290,3 +290,8 @@ TEST_CASE("04: a tree that may not be as deep as asked says so") {
   CHECK(std::any_of(remarks.begin(), remarks.end(),
                     [](const std::string& remark) { return remark.find("52 deep") != std::string::npos; }));
 }
+
+// Catches: a walk that begins behind the place where the test found a triangle, or ends before it.
+TEST_CASE("04: rays that start at edges and graze have the hits of brute force") {
+  check_edge_starts(kd_tree({}));
+}

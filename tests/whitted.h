@@ -138,6 +138,30 @@ double turning_point(WhittedRenderer& renderer, double low, double high, const M
   return (low + high) / 2;
 }
 
+/// Rays that start within some roundings of a mesh's edges, on both sides of their triangles, and leave
+/// nearly in the triangle's plane, at a slope of up to `grazing`: where t of the own surface says nothing.
+inline std::vector<Ray> rays_from_edges(const Mesh& mesh, double grazing, int n, std::uint64_t seed) {
+  std::vector<Ray> rays;
+  for (int i = 0; i < n; ++i) {
+    Random random(seed, std::uint64_t(i));
+    const auto number = static_cast<std::size_t>(random.uniform_double() * double(mesh.triangles.size()));
+    const uvec3 t = mesh.triangles[std::min(number, mesh.triangles.size() - 1)];
+    const int first = i % 3;
+    const dvec3 a(mesh.positions[t[first]]), b(mesh.positions[t[(first + 1) % 3]]),
+        c(mesh.positions[t[(first + 2) % 3]]);
+    const dvec3 cross = glm::cross(b - a, c - a);
+    if (!(glm::length(cross) > 0)) continue;
+    const auto within = [&](double most) { return most * (2 * random.uniform_double() - 1); };
+    const dvec3 normal = glm::normalize(cross), along = glm::normalize(b - a),
+                inwards = glm::cross(normal, along);
+    const double u = round_off * std::max({1.0, glm::length(a)});
+    const dvec3 from =
+        a + (b - a) * random.uniform_double() + inwards * within(10 * u / grazing) + normal * within(6 * u);
+    rays.push_back(ray_from(from, inwards * within(1) + along * within(1) + normal * within(grazing)));
+  }
+  return rays;
+}
+
 inline dvec3 random_direction(Random& random) {
   for (;;) {
     const dvec3 v = {2 * random.uniform_double() - 1, 2 * random.uniform_double() - 1,

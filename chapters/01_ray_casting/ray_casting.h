@@ -71,8 +71,8 @@ struct Triangles {
                         const RayOf<T>& ray, const Constants& constants, HitOf<T>& hit) const {
     Solution<T> s;
     if (!Test::solve(measure, ray, constants, s)) return;
-    if (!(comes_before(s.t, i, hit) && (s.front || !one_sided))) return;
-    if (surely_ahead) {
+    if (!(s.front || !one_sided)) return;
+    if (surely_ahead) {  // before anything is compared: else the answer would depend on who is asked first
       // a t within its error of zero says nothing: the surface that the ray starts on, or the one ahead
       if (!(std::fabs(s.t) > Test::t_bound(measure, triangle, ray, constants, s.t)))
         s.t = Test::near_t(triangle, ray, constants);
